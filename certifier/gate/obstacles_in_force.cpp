@@ -73,8 +73,7 @@ void ObstaclesInForce::TakeSet(const obstacles_t& message) {
   if (state_.set.Take(message) != ObstacleSet::Known::kNew) return;
   try {
     std::vector<Obstacle> heard = FromMessage(state_.set.obstacles(), message.utime, dim_, state_.heard);
-    RequireClock(heard);
-    RequireGrids(heard);
+    RequireUsable(heard);
     state_.heard = std::move(heard);
   } catch (const std::invalid_argument&) {
     state_.set.Refuse();
@@ -82,6 +81,11 @@ void ObstaclesInForce::TakeSet(const obstacles_t& message) {
   }
   const Digest digest = ObstaclesDigest(state_.heard);
   if (digest != std::exchange(state_.heard_digest, digest)) Put();
+}
+
+void ObstaclesInForce::RequireUsable(const std::vector<Obstacle>& heard) const {
+  RequireClock(heard);
+  RequireGrids(heard);
 }
 
 // When a plan meets what moves is known only up to the error of the robot's clock.
@@ -158,6 +162,12 @@ Freshness ObstaclesInForce::FreshnessAt(std::int64_t utime, std::int64_t now_us)
 void ObstaclesInForce::Inherit(const ObstaclesInForce& before) {
   state_ = before.state_;
   state_.sender.Follow(Microseconds(options_.obstacles_timeout_ms));
+  try {
+    RequireUsable(state_.heard);
+  } catch (const std::invalid_argument& error) {
+    state_.set.Refuse();
+    state_.doubt = error.what();
+  }
   Put();
 }
 

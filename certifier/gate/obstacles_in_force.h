@@ -53,7 +53,8 @@ class ObstaclesInForce final {
   /** The reason why all() may be incomplete at this time; empty if the obstacles are known. Cost O(1). */
   [[nodiscard]] std::string WhyUnknown(std::int64_t now_us) const;
 
-  /** Continues with the received obstacles of another object, after a reload. */
+  /** Continues with the received obstacles of another object, after a reload. They are unknown if this task cannot have
+  them in force. */
   void Inherit(const ObstaclesInForce& before);
 
   [[nodiscard]] const std::vector<Obstacle>& all() const { return all_; }
@@ -87,6 +88,8 @@ class ObstaclesInForce final {
 
   [[nodiscard]] std::string Doubt(const std::string& why);
   [[nodiscard]] std::string Take(const obstacles_t& message, std::int64_t now_us);
+  // @throws std::invalid_argument if these cannot be in force under this task: when they are heard, and after a reload.
+  void RequireUsable(const std::vector<Obstacle>& heard) const;
   void RequireClock(const std::vector<Obstacle>& obstacles) const;
   void RequireGrids(const std::vector<Obstacle>& heard) const;
   void NoteOrder(std::int64_t sequence, std::int64_t now_us);

@@ -442,19 +442,44 @@ TEST(GateMovingTest, RefusesMovingObstaclesWithoutABoundOnTheClockError) {
   EXPECT_NE(gate.WhyObstaclesUnknown(kNow), "");
 }
 
+std::vector<Obstacle> Grids(std::size_t count) {
+  return std::vector(count, Obstacle::Grid(std::make_shared<const OccupancyGrid>(
+                                GridMap{0.05, {-90, 90}, 0, 1, 1, std::vector<bool>(1, true), true})));
+}
+
 TEST(GateGridsTest, RefusesMoreThanACertifierTakesWithThoseOfItsTask) {
-  const auto grids = [](std::size_t count) {
-    return std::vector(count, Obstacle::Grid(std::make_shared<const OccupancyGrid>(
-                                  GridMap{0.05, {-90, 90}, 0, 1, 1, std::vector<bool>(1, true), true})));
-  };
   Config config = SmallTaskOnTheBus();
-  for (const Obstacle& grid : grids(ConvexNumbers::kMostGrids - 1)) config.obstacles.push_back(grid);
+  for (const Obstacle& grid : Grids(ConvexNumbers::kMostGrids - 1)) config.obstacles.push_back(grid);
   Gate gate(config);
-  EXPECT_THAT(gate.UpdateObstacles(MovingMessage(0, kNow, grids(2)), kNow),
+  EXPECT_THAT(gate.UpdateObstacles(MovingMessage(0, kNow, Grids(2)), kNow),
               HasSubstr("2 grids and 7 of the task file, at most 8 in all"));
   EXPECT_NE(gate.WhyObstaclesUnknown(kNow), "");
-  EXPECT_EQ(gate.UpdateObstacles(MovingMessage(1, kNow, grids(1)), kNow), "");
+  EXPECT_EQ(gate.UpdateObstacles(MovingMessage(1, kNow, Grids(1)), kNow), "");
   EXPECT_EQ(gate.WhyObstaclesUnknown(kNow), "");
+}
+
+TEST(GateGridsTest, OfTheBusAreUnknownAfterAReloadWithWhichTheyAreTooMany) {
+  Gate gate(SmallTaskOnTheBus());
+  ASSERT_EQ(gate.UpdateObstacles(MovingMessage(0, kNow, Grids(2)), kNow), "");
+  Config config = SmallTaskOnTheBus();
+  for (const Obstacle& grid : Grids(ConvexNumbers::kMostGrids - 2)) config.obstacles.push_back(grid);
+  Gate fits(config);
+  fits.Inherit(gate);
+  EXPECT_EQ(fits.WhyObstaclesUnknown(kNow), "");
+  config.obstacles.push_back(Grids(1)[0]);
+  Gate too_many(config);
+  too_many.Inherit(gate);
+  EXPECT_THAT(too_many.WhyObstaclesUnknown(kNow), HasSubstr("2 grids and 7 of the task file"));
+  EXPECT_THAT(too_many.UpdateObstacles(MovingMessage(1, kNow, Grids(2)), kNow), HasSubstr("2 grids")) << "the same set";
+  EXPECT_EQ(too_many.UpdateObstacles(MovingMessage(2, kNow, Grids(1)), kNow), "");
+  EXPECT_EQ(too_many.WhyObstaclesUnknown(kNow), "");
+}
+
+TEST(GateMovingTest, AreUnknownAfterAReloadWithoutABoundOnTheClockError) {
+  Gate gate(SmallTaskWithAClock()), reloaded(SmallTaskOnTheBus());
+  ASSERT_EQ(gate.UpdateObstacles(MovingMessage(0), kNow), "");
+  reloaded.Inherit(gate);
+  EXPECT_THAT(reloaded.WhyObstaclesUnknown(kNow), HasSubstr("obstacle 0 moves"));
 }
 
 // The candidate starts in half a second and reaches the wall with its sample 5, 0.75 s later; its sample 6 is past it.
