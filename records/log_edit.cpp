@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <deque>
+#include <map>
 #include <memory>
 #include <string_view>
 #include <utility>
@@ -136,8 +137,9 @@ class Queue final {
     if (outcome_.empty() || !IsDecision(summary)) return;
     const bool has_outcome = summary.what == outcome_;
     if (has_outcome) plans_.insert(summary.plan);
-    for (Held& held : held_)
-      if (held.waits && held.summary->plan == summary.plan) held.waits = false, held.goes = has_outcome;
+    const auto [first, last] = waiting_.equal_range(summary.plan);
+    for (auto each = first; each != last; ++each) each->second->waits = false, each->second->goes = has_outcome;
+    waiting_.erase(first, last);
     PassOn();
   }
   void Add(const LogEvent& event, const std::optional<MessageSummary>& summary, const std::string& log) {
@@ -145,7 +147,8 @@ class Queue final {
     const bool waits = is_in_question && summary->type != "advice_t";  // which is given after the decision
     if (is_in_question && !waits) return;
     if (held_.empty() && !waits) return Pass(event, summary, log);
-    held_.push_back({event, summary, log, waits, !waits});
+    Held& held = held_.emplace_back(Held{event, summary, log, waits, !waits});
+    if (waits) waiting_.emplace(summary->plan, &held);
     bytes_ += RecordBytes(event);
     while (bytes_ > kMostHeldBytes) PassFirst(), PassOn();
   }
@@ -165,10 +168,16 @@ class Queue final {
     while (!held_.empty() && !held_.front().waits) PassFirst();
   }
   void PassFirst() {
+    if (held_.front().waits) Forget(held_.front());
     const Held first = std::move(held_.front());
     held_.pop_front();
     bytes_ -= RecordBytes(first.event);
     if (first.goes) Pass(first.event, first.summary, first.log);
+  }
+  void Forget(const Held& held) {
+    auto each = waiting_.find(held.summary->plan);
+    while (each->second != &held) ++each;
+    waiting_.erase(each);
   }
   void Pass(const LogEvent& event, const std::optional<MessageSummary>& summary, const std::string& log) {
     ++passed_;
@@ -178,8 +187,9 @@ class Queue final {
   const std::string& outcome_;
   const LogUser& user_;
   std::int64_t& passed_;
-  std::set<Digest> plans_;  // with the outcome
-  std::deque<Held> held_;   // the first of them waits
+  std::set<Digest> plans_;                // with the outcome
+  std::deque<Held> held_;                 // the first of them waits
+  std::multimap<Digest, Held*> waiting_;  // by plan: a decision looks at no others
   std::int64_t bytes_ = 0;
 };
 
