@@ -55,7 +55,8 @@ missing_packages() {
     [[ $present == *" $package "* ]] || echo "$package"
   done
 }
-install=(apt-get install -y --no-install-recommends) listed=''
+# Who begins again at once waits for an installation that a broken build has left behind.
+install=(apt-get -o DPkg::Lock::Timeout=600 install -y --no-install-recommends) listed=''
 # install_packages [NAME...]: installs them.
 install_packages() {
   local missing begin=$SECONDS
