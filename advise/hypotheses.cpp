@@ -57,9 +57,8 @@ void AddRatesAndTurns(const Config& config, std::vector<Hypothesis>& all) {
       rates += (rates.empty() ? "" : ", ") + model.state_names()[ToSize(static_cast<int>(k))] + " " + ToText(bound[k]);
   if (!rates.empty())
     all.push_back({"no state changes faster, a second, than " + rates,
-                   "declared (model.rate_bound); `forereach declare --between --rates` proves it of the equations. A "
-                   "transition that "
-                   "shows more falsifies it (F), a plan that needs more is not certified (D)"});
+                   "declared (model.rate_bound); `forereach declare --between --rates` proves it of the equations. "
+                   "A transition that shows more falsifies it (F), a plan that needs more is not certified (D)"});
   for (const int k : model.angles()) angles += (angles.empty() ? "" : ", ") + model.state_names()[ToSize(k)];
   if (!angles.empty())
     all.push_back({"no step turns " + angles + " by three quarters of a turn or more beyond the model",

@@ -161,8 +161,8 @@ class Examination final {
     problem_.transitions = all_;
     try {
       ValidateDurations(problem_);
-    } catch (const std::invalid_argument& error) {
-      throw ConfigError(result_.data + ": dt_error: " + error.what());
+    } catch (const std::invalid_argument& refused) {
+      throw ConfigError(result_.data + ": dt_error: " + refused.what());
     }
   }
 

@@ -15,6 +15,7 @@
 #include "cli/commands.h"
 #include "command_line/nearest.h"
 #include "command_line/progress.h"
+#include "forereach/certify/learned.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "identify/channel_table.h"

@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include "forereach/certify/learned.h"
-#include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/step_rate.h"
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/limits.h"

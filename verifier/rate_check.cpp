@@ -2,6 +2,8 @@
 
 #include <limits>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "forereach/numerics/size.h"
 #include "verifier/equations.h"

@@ -3,8 +3,6 @@ the verifier's own parser and intervals of 128 bits. */
 #pragma once
 
 #include <span>
-#include <string>
-#include <vector>
 
 #include "forereach/dynamics/model.h"
 #include "forereach/reach/domain.h"

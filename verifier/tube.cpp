@@ -1276,7 +1276,7 @@ Real TubeMaker::ScaleAt(int k, const Seen& seen) const {
 // What some transitions say at the nodes of a plane (ways.h), and the largest of their sizes.
 struct TubeMaker::Plane {
   Nodes nodes;
-  std::vector<bool> seen = {};
+  std::vector<bool> added = {};
   std::ptrdiff_t count = 0;
   Real size = {};
 };
@@ -1292,21 +1292,21 @@ std::shared_ptr<const TubeMaker::Plane> TubeMaker::PlaneOf(int k, const KnownRow
   std::shared_ptr<const Plane> best;
   for (const auto& plane : planes) {
     bool is_part = !best || plane->count > best->count;
-    for (std::size_t i = 0; i < plane->seen.size() && is_part; ++i) is_part = !plane->seen[i] || wanted[i];
+    for (std::size_t i = 0; i < plane->added.size() && is_part; ++i) is_part = !plane->added[i] || wanted[i];
     if (is_part) best = plane;
   }
   if (best && best->count == std::ranges::count(wanted, true)) return best;
   const auto plane = std::make_shared<Plane>(best ? *best : Plane{Nodes(ways_, k)});
-  plane->seen.resize(wanted.size());
+  plane->added.resize(wanted.size());
   for (int i = 0; i < data.size(); ++i) {
-    if (!wanted[ToSize(i)] || plane->seen[ToSize(i)]) continue;
+    if (!wanted[ToSize(i)] || plane->added[ToSize(i)]) continue;
     const auto seen = See(i);
     const auto& [lower, upper] = seen->residual[ToSize(k)];
     if (lower.IsFinite() && upper.IsFinite()) {
       plane->size = max(plane->size, ScaleAt(k, *seen));
       plane->nodes.Add(data.z.row(i), lower, upper);
     }
-    plane->seen[ToSize(i)] = true;
+    plane->added[ToSize(i)] = true;
     ++plane->count;
   }
   plane->nodes.Spread();

@@ -22,18 +22,18 @@ double LeastChange(const Interval& a, const Interval& b, bool is_angle) noexcept
 }
 
 RateBounds::RateBounds(const Problem& problem) : problem_(&problem), period_(StepOf(*problem.model)) {
-  const auto add = [&](int state, double rate, double longest, const std::string& key) {
-    if (rate < kInfinity) bounds_.push_back({state, rate, MulUp(rate, longest), key, problem.model->IsAngle(state)});
+  const auto add = [&](int state, double rate, double step, const std::string& key, double longest) {
+    if (rate < kInfinity)
+      bounds_.push_back({state, rate, MulUp(rate, step), key, problem.model->IsAngle(state), longest});
   };
   // A step may begin early and end late. Rounded up: what is refuted has to be refuted for the longest step.
-  const double longest = AddUp(period_, MulUp(2, problem.timing.error));
+  const double step = AddUp(period_, MulUp(2, problem.timing.error));
   for (int k = 0; period_ > 0 && k < problem.timing.rate_bound.size(); ++k)
-    add(k, problem.timing.rate_bound[k], longest, "model.rate_bound." + problem.model->state_names()[ToSize(k)]);
-  if (const int heading = problem.body.heading; problem.between && heading >= 0) {
-    const std::size_t before = bounds_.size();
-    add(heading, problem.between->turn_rate, problem.between->period, "task.between.turn_rate");
-    if (bounds_.size() > before) bounds_.back().longest = std::max(period_, problem.between->period);
-  }
+    add(k, problem.timing.rate_bound[k], step, "model.rate_bound." + problem.model->state_names()[ToSize(k)],
+        kInfinity);
+  if (const int heading = problem.body.heading; problem.between && heading >= 0)
+    add(heading, problem.between->turn_rate, problem.between->period, "task.between.turn_rate",
+        std::max(period_, problem.between->period));
 }
 
 Eigen::VectorXd RateBounds::Shown(std::span<const double> z, std::span<const double> next, double longer,

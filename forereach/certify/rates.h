@@ -7,7 +7,6 @@ What a record may be off is taken off the change, so a motion that keeps the bou
 (docs/soundness.md, 3.17). */
 #pragma once
 
-#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -34,7 +33,7 @@ class RateBounds final {
     double rate, change;
     std::string key;  ///< In the task file.
     bool is_angle;
-    double longest = std::numeric_limits<double>::infinity();  ///< In steps up to so long alone, s.
+    double longest;  ///< In steps up to so long alone, s; infinity: in all.
   };
   /** Those that are finite. */
   [[nodiscard]] std::span<const Bound> bounds() const { return bounds_; }
