@@ -72,7 +72,8 @@ TEST(RegionalCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheRegionsAreNotD
   for (TracedRandom random(2121); random.Again(40);) {
     SCOPED_TRACE("trial " + std::to_string(random.trial()));
     const bool bicycle = random.Coin();
-    auto problem = AnyRegionalProblem(random, bicycle, random.Integer(2, 8), random.Coin());
+    const int transitions = random.Integer(2, 8);
+    auto problem = AnyRegionalProblem(random, bicycle, transitions, random.Coin());
     if (random.Coin(0.3)) problem = Recorded(random, *problem);
     if (random.Coin(0.3)) Shift(random, *problem);
     const Verifier judge(problem, MethodOf(*problem));
