@@ -72,7 +72,7 @@ class Period final {
 
 class Recorder final {
  public:
-  static constexpr std::size_t kMaxWaitingRows = 100'000;
+  static constexpr std::size_t kMaxWaitingRows = 20'000;
 
   /** Makes the directory if necessary, opens the database in it and repairs earlier runs. With bus.key only authentic
   messages make rows (records/interpreter.h).

@@ -29,6 +29,7 @@ namespace {
 
 constexpr const char* kSource = "torture";
 constexpr double kAnswersWithinS = 0.4;  // of a gate that refuses
+constexpr int kHonestTries = 5;
 constexpr std::int64_t kJumpUs = 3'600'000'000;
 
 class Torturer final {
@@ -157,15 +158,18 @@ class Torturer final {
     return *row_;
   }
 
-  // How an honest candidate is answered; and whether it was judged, as no attack may be.
+  // How an honest candidate is answered; and whether it was judged, as no attack may be. On a loaded machine one may come
+  // too late for its start.
   std::pair<std::string, bool> AskHonestly() {
     TortureRow unused;
     row_ = &unused;
-    const auto bytes = Encode(Honest());
-    const Asked& asked = asked_[PlanDigest(Bytes(bytes))];
-    Send(config_.bus.candidate, bytes);
-    Listen(options_.patience_s, [&] { return !asked.text.empty(); });
-    return {asked.text, asked.judged > 0};
+    for (int more = kHonestTries;; --more) {
+      const auto bytes = Encode(Honest());
+      const Asked& asked = asked_[PlanDigest(Bytes(bytes))];
+      Send(config_.bus.candidate, bytes);
+      Listen(options_.patience_s, [&] { return !asked.text.empty(); });
+      if (more == 1 || asked.judged > 0 || asked.text.empty()) return {asked.text, asked.judged > 0};
+    }
   }
 
   bool HearsHeartbeat() {

@@ -12,6 +12,9 @@
 namespace forereach::reload_test {
 
 struct ReloadTest : testing::Test {
+  ~ReloadTest() override {
+    while (reloads_under_way > 0) std::this_thread::yield();
+  }
   void Write(const std::string& text) const { std::ofstream(path_) << text; }
   void Copy(const std::function<std::string(std::string)>& edit, const std::string& shipped = "point_mass") const {
     const std::string text = Read(FOREREACH_SOURCE_DIR "/config/" + shipped + ".yaml");

@@ -1,6 +1,8 @@
 // Two processes under one key on one stream: the certifier certifies nothing on what either of them says.
 #include "tests/test.h"
 
+#include <thread>
+
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/process/certifier_node.h"
 #include "tests/certifier/signed_air.h"
@@ -295,6 +297,7 @@ TEST_F(TwoRobotsTest, AReloadDoesNotArm) {
   Stands(second, 0);
   Run();
   node_->Reload();  // of a task file that is not there: it stays as it is
+  while (reloads_under_way > 0) std::this_thread::yield();
   Run();
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
 }

@@ -131,7 +131,7 @@ struct ShardsTest : testing::Test {
 
 TEST_F(ShardsTest, OfTheRecordedCourseMakeTheWhole) {
   EXPECT_THAT(ExpectMergedAsWhole("replay " + kCourseLog + config_), Exits(0, " 0 differ"));
-  EXPECT_THAT(ExpectMergedAsWhole("verify " + kCourseLog + config_, {7}), Exits(0, " 0 refuted"));
+  EXPECT_THAT(ExpectMergedAsWhole("verify " + kCourseLog + config_, {3}), Exits(0, " 0 refuted"));
   EXPECT_THAT(ExpectMergedAsWhole("replay " + kCourseLog + config_ + " --compare", {2}), Exits(0, "none of the"));
   EXPECT_THAT(
       ExpectMergedAsWhole(
@@ -163,7 +163,7 @@ TEST_F(ShardsTest, OfAdviceMakeTheWhole) {
   const std::string advise = "advise " + FirstDecisions(20) + config_;
   EXPECT_THAT(ExpectMergedAsWhole(advise, {2}),
               Exits(0, "it would be certified", "where one more observation would turn most"));
-  EXPECT_THAT(ExpectMergedAsWhole(advise + " --all --inner", {7}), Exits(0, "the inner bound", "not enough alone"));
+  EXPECT_THAT(ExpectMergedAsWhole(advise + " --all --inner", {3}), Exits(0, "the inner bound", "not enough alone"));
 }
 
 TEST_F(ShardsTest, OfAnExportMakeTheSameFiles) {
@@ -174,9 +174,9 @@ TEST_F(ShardsTest, OfAnExportMakeTheSameFiles) {
 // More shards than cases.
 TEST_F(ShardsTest, WithoutCasesBelongToTheWhole) {
   const std::string log = FirstDecisions(2);
-  for (const std::string command : {"replay ", "verify ", "advise "}) ExpectMergedAsWhole(command + log + config_, {7});
-  ExpectMergedAsWhole("replay --compare " + log + config_, {7});
-  for (const std::string format : {"csv", "npz"}) ExpectSameExport(log + config_, format, {7});
+  for (const std::string command : {"replay ", "verify ", "advise "}) ExpectMergedAsWhole(command + log + config_, {3});
+  ExpectMergedAsWhole("replay --compare " + log + config_, {3});
+  for (const std::string format : {"csv", "npz"}) ExpectSameExport(log + config_, format, {3});
 }
 
 TEST_F(ShardsTest, OfAnExportThatAreDamagedAreRefused) {
