@@ -1,5 +1,5 @@
-// Continuous motions under certificates never meet an obstacle, and the trials would notice if they did: without any
-// one part of the declaration, they find contacts.
+// Continuous motions under certificates never meet an obstacle and are never held against the declaration, and the
+// trials would notice if they did or were: without any one part of the declaration, they find contacts or latches.
 #include "tests/test.h"
 
 #include "tests/oracle/motions.h"
@@ -14,6 +14,7 @@ TEST(ContinuousMotion, NeverMeetsAnObstacleUnderACertificate) {
   EXPECT_GT(total.certified, 100) << total.Text();
   EXPECT_GT(total.withdrawn, 20) << total.Text();
   EXPECT_GT(total.motions, 4000) << total.Text();
+  EXPECT_GT(total.learned, 1000) << total.Text();
   EXPECT_GT(total.decided_exactly, 10) << total.Text();
   EXPECT_GT(total.shifted, 30) << total.Text();
   EXPECT_GT(total.recorded, 30) << total.Text();
@@ -22,7 +23,7 @@ TEST(ContinuousMotion, NeverMeetsAnObstacleUnderACertificate) {
 
 class WithoutOnePart : public testing::TestWithParam<Untold> {};
 
-TEST_P(WithoutOnePart, ObstaclesAreMetWhenOnePartOfTheDeclarationIsLeftOut) {
+TEST_P(WithoutOnePart, MeetsObstaclesOrRefusesTrueMotions) {
   int contacts = 0;
   std::uint64_t number = 0;
   for (; contacts < 3 && number < 400; ++number) try {
@@ -34,14 +35,16 @@ TEST_P(WithoutOnePart, ObstaclesAreMetWhenOnePartOfTheDeclarationIsLeftOut) {
 }
 
 std::string NameOf(const testing::TestParamInfo<Untold>& tested) {
-  static constexpr std::array kNames{"Nothing", "Acceleration", "Turn",     "Body",   "Velocity",
-                                     "Growth",  "ClockError",   "Lateness", "Offsets"};
+  static constexpr std::array kNames{"Nothing",  "Acceleration", "Turn",        "Body",
+                                     "Velocity", "Growth",       "ClockError",  "Lateness",
+                                     "Offsets",  "StateErrors",  "InputErrors", "Durations"};
   return kNames[static_cast<std::size_t>(tested.param)];
 }
 
 INSTANTIATE_TEST_SUITE_P(OfTheDeclaration, WithoutOnePart,
                          testing::Values(Untold::kAcceleration, Untold::kTurnRate, Untold::kBody, Untold::kVelocity,
-                                         Untold::kGrowth, Untold::kClockError, Untold::kLateness, Untold::kOffsets),
+                                         Untold::kGrowth, Untold::kClockError, Untold::kLateness, Untold::kOffsets,
+                                         Untold::kStateErrors, Untold::kInputErrors, Untold::kDurations),
                          NameOf);
 
 TEST(Bulge, IsZeroAtBothEndsAndReachesItsBound) {

@@ -7,7 +7,11 @@ certificate it follows admissible residuals from sample to sample: none leaves i
 motions whose second derivatives are piecewise constant, within the declared bounds and often equal to them, and that
 keep the samples. Moving obstacles have any clock error, and are anywhere in their declared sets. A contact is a broken
 promise. Then an obstacle appears that the certifier just accepts up to some step of the plan: what it says still stands
-is followed in the same way. */
+is followed in the same way.
+
+Nor is anything held against such a robot: it measures its states with errors, often of all that is declared, and none
+of these measurements has left a slice; it records its steps so, with their durations and up to the noise bound beside,
+and no certifier that learns them finds a contradiction. */
 #pragma once
 
 #include <algorithm>
@@ -20,8 +24,10 @@ is followed in the same way. */
 #include <utility>
 #include <vector>
 
+#include "forereach/certify/rates.h"
 #include "forereach/certify/standing.h"
 #include "forereach/numerics/size.h"
+#include "lcmtypes/angle.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/any_surroundings.h"
 #include "tests/oracle/meeting.h"
@@ -30,11 +36,24 @@ namespace forereach {
 
 /** A part of the declaration that the certifier of a trial is not told, which shows that the trial would find its
 absence. */
-enum class Untold { kNothing, kAcceleration, kTurnRate, kBody, kVelocity, kGrowth, kClockError, kLateness, kOffsets };
+enum class Untold {
+  kNothing,
+  kAcceleration,
+  kTurnRate,
+  kBody,
+  kVelocity,
+  kGrowth,
+  kClockError,
+  kLateness,
+  kOffsets,
+  kStateErrors,
+  kInputErrors,
+  kDurations
+};
 
 struct Tally {
   long problems = 0, plans = 0, certified = 0, withdrawn = 0, motions = 0, moments = 0, decided_exactly = 0,
-       inadmissible = 0, shifted = 0, recorded = 0,
+       inadmissible = 0, learned = 0, shifted = 0, recorded = 0,
        all_at_once = 0;  // of the certified: with steps off their times, with errors of records, with disturbances, too
 
   void Add(const Tally& other) {
@@ -46,6 +65,7 @@ struct Tally {
     moments += other.moments;
     decided_exactly += other.decided_exactly;
     inadmissible += other.inadmissible;
+    learned += other.learned;
     shifted += other.shifted;
     recorded += other.recorded;
     all_at_once += other.all_at_once;
@@ -55,12 +75,12 @@ struct Tally {
     text << problems << " problems, " << plans << " plans, " << certified << " certified (" << shifted
          << " with steps off their times, " << recorded << " from records with errors, " << all_at_once
          << " with both and disturbed), " << withdrawn << " withdrawn in part; " << motions << " motions, " << moments
-         << " moments, " << decided_exactly << " of them decided in 256 bits";
+         << " moments, " << decided_exactly << " of them decided in 256 bits; " << learned << " steps learned";
     return text.str();
   }
 };
 
-/** A contact under a certificate. */
+/** A contact under a certificate, or a true motion that is held against its declaration. */
 class Contradiction : public std::logic_error {
   using std::logic_error::logic_error;
 };
@@ -249,7 +269,7 @@ class MotionJudge {
 class MotionTrial {
  public:
   explicit MotionTrial(std::uint64_t seed, Untold untold = Untold::kNothing)
-      : random_(seed), winds_(~seed), untold_(untold) {}
+      : random_(seed), winds_(~seed), records_(seed ^ 0x2545f4914f6cdd1d), untold_(untold) {}
 
   /** @throws Contradiction with the circumstances. */
   [[nodiscard]] Tally Run(int plans) {
@@ -347,19 +367,22 @@ class MotionTrial {
     const Problem& problem = judge.problem();
     const AdmissibleResidual residual(random_, problem);
     std::vector<Real> x = PointOf(random_, query.initial_set);
+    const std::unique_ptr<Certifier> learner = MakeLearner(problem);
+    Eigen::VectorXd measured = Measured(x);
     Real offset;
     for (int t = 0; t < standing; ++t) {
-      std::vector<Real> z = x, most;
-      for (int l = 0; l < query.controls.rows(); ++l) z.push_back(ActedInput(winds_, *told_, l, query.controls(l, t)));
-      std::vector<Real> unexpected = AnyDisturbance(winds_, problem, z);
-      for (std::size_t k = 0; k < unexpected.size(); ++k) {
-        const Real r = residual(z, static_cast<int>(k));
-        unexpected[k] += r;
-        most.push_back(abs(r) + DisturbanceAt(problem, z, static_cast<Eigen::Index>(k)));
-      }
+      const Eigen::VectorXd u = query.controls.col(t);
+      std::vector<Real> z = x;
+      for (int l = 0; l < u.size(); ++l) z.push_back(ActedInput(winds_, *told_, l, u[l]));
       const Real before = std::exchange(offset, NextOffset(problem, offset));
       const std::vector<Real> next = Rolled(winds_, problem, residual, z, offset - before);
       RequireInSlice(next, t + 1);
+      Eigen::VectorXd recorded(z.size());
+      recorded << measured, u;
+      measured = Measured(next);
+      RequireConsistent(measured, t + 1);
+      if (learner && KeepsRates(x, next, Real(StepOf(*problem.model)) + offset - before))
+        Learn(*learner, problem, recorded, measured, abs(offset - before));
       const Chord chord = judge.ChordOf(x, next, before, offset);
       if (t >= first && problem.between)
         Follow(judge, chord, obstacles, t);
@@ -384,6 +407,74 @@ class MotionTrial {
       text << random_.trace() << ": state " << k << " leaves slice " << t << " of plan " << tally_.plans;
       throw Contradiction(text.str());
     }
+  }
+
+  // ---- What a robot measures and records.
+
+  [[nodiscard]] double StateError(Eigen::Index k) const {
+    constexpr double kLastBits = 1e-7;  // at least: a true state is no double
+    return std::max(told_->declaration.VariableError(k), kLastBits);
+  }
+  [[nodiscard]] double ToldStateError(Eigen::Index k) const {
+    return untold_ == Untold::kStateErrors ? 0 : StateError(k);
+  }
+
+  // By all of the error or by anything within it. The margin of 1e-6 is for rounding.
+  double Off(double error) {
+    return (1 - 1e-6) * error * (records_.Coin(0.7) ? records_.Sign() : records_.Uniform(-1, 1));
+  }
+
+  Eigen::VectorXd Measured(const std::vector<Real>& x) {
+    Eigen::VectorXd measured(std::ssize(x));
+    for (Eigen::Index k = 0; k < measured.size(); ++k)
+      measured[k] = (x[ToSize(k)] + Real(Off(StateError(k)))).ToDouble();
+    return measured;
+  }
+
+  void RequireConsistent(const Eigen::VectorXd& measured, int t) const {
+    for (Eigen::Index k = 0; k < measured.size(); ++k) {
+      const Interval hull = tube_.hull(t, static_cast<int>(k));
+      if (Conform(measured[k], ToldStateError(k), hull.lower, hull.upper, false) != Conformance::kLeft) continue;
+      std::ostringstream text;
+      text << random_.trace() << ": state " << k << " is said to leave slice " << t << " of plan " << tally_.plans;
+      throw Contradiction(text.str());
+    }
+  }
+
+  // Of steps that are recorded with errors; what it is given is exact. Null where something else is untold.
+  std::unique_ptr<Certifier> MakeLearner(const Problem& truth) const {
+    if (untold_ != Untold::kNothing && untold_ < Untold::kStateErrors) return nullptr;
+    auto problem = std::make_shared<Problem>(*told_);
+    Declaration& declaration = problem->declaration;
+    declaration.given_are_exact = true;
+    declaration.state_error =
+        Eigen::VectorXd::NullaryExpr(truth.model->num_states(), [this](Eigen::Index k) { return ToldStateError(k); });
+    if (untold_ == Untold::kInputErrors) declaration.input_error.setZero();
+    problem->transitions = truth.transitions;
+    return std::make_unique<Certifier>(problem);
+  }
+
+  // Whether a motion within the declared rates can have made a step: another one is not true.
+  [[nodiscard]] bool KeepsRates(const std::vector<Real>& x, const std::vector<Real>& next, const Real& duration) const {
+    const RateBounds rates(*told_);
+    return std::ranges::all_of(rates.bounds(), [&](const RateBounds::Bound& bound) {
+      const std::size_t k = ToSize(bound.state);
+      return abs(next[k] - x[k]) <= Real(bound.rate) * duration;
+    });
+  }
+
+  void Learn(Certifier& learner, const Problem& truth, const Eigen::VectorXd& z, Eigen::VectorXd next,
+             const Real& longer) {
+    for (Eigen::Index k = 0; k < next.size(); ++k) next[k] += Off(truth.declaration.noise_bound[k]);
+    const double by_clock = untold_ == Untold::kDurations ? 0 : NextUp(longer.ToDouble());
+    const std::optional<double> counted = CountedDuration(*told_, by_clock, false);
+    if (!counted) throw Contradiction(random_.trace() + ": a step is said to be off its time");
+    tally_.learned += learner.Learn(View(z), View(next), *counted) == Learned::kAdded;
+    if (!learner.violation()) return;
+    std::ostringstream text;
+    text << random_.trace() << ": a step of plan " << tally_.plans << " is said to contradict the declaration in state "
+         << learner.violation()->coordinate;
+    throw Contradiction(text.str());
   }
 
   void Follow(const MotionJudge& judge, const Chord& chord, const std::vector<Obstacle>& obstacles, int t) {
@@ -421,7 +512,7 @@ class MotionTrial {
     }
   }
 
-  Random random_, winds_;
+  Random random_, winds_, records_;
   Untold untold_;
   std::shared_ptr<const Problem> told_;
   std::int64_t step_error_us_ = 0;  // what the certifier is told
