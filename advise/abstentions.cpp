@@ -55,13 +55,17 @@ void AbstentionReader::OnDecision(const RecordedDecision& recorded) {
     ++read_.certified;
     return;
   }
-  if (all_.size() < most_) {
-    all_.emplace_back();
-  } else {
-    all_.splice(all_.end(), all_, all_.begin());  // its place is used again
-    all_.back() = {};
+  std::list<RecordedAbstention> place;  // of the oldest, which is used again
+  while (!all_.empty() && (all_.size() >= most_ || obstacles_.AreTooMany())) {
+    obstacles_.Remove(*all_.front().basis.obstacles);
+    place.clear();
+    place.splice(place.end(), all_, all_.begin());
     ++read_.left_out;
   }
+  place.resize(1);
+  place.back() = {};
+  all_.splice(all_.end(), place);
+  obstacles_.Add(*recorded.basis.obstacles);
   RecordedAbstention& abstention = all_.back();
   abstention.basis = recorded.basis;
   abstention.event = recorded.event;

@@ -12,6 +12,7 @@
 #include "advise/case.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "records/kept_obstacles.h"
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
 #include "records/run_logs.h"
@@ -79,6 +80,7 @@ class AbstentionReader final : public TimelineUser {
   std::shared_ptr<const std::pair<std::vector<std::uint8_t>, std::int64_t>> last_obstacles_;
   Abstentions read_;
   std::list<RecordedAbstention> all_;
+  KeptObstacles obstacles_;  // of these
 };
 
 /** The last `most` of a run's logs.

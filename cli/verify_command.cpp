@@ -13,6 +13,7 @@
 #include "forereach/numerics/parallel.h"
 #include "lcmtypes/printable.h"
 #include "records/certificate_files.h"
+#include "records/kept_obstacles.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
 #include "records/result.h"
@@ -99,7 +100,8 @@ class Verifying final : public CertificateUser {
     verifier::Verifier* const verifier = recorded.missing.empty() ? &VerifierOf(*basis) : nullptr;
     if (!results_.Next(shard_)) return;
     waiting_.push_back({std::move(recorded), results_.cases - 1, verifier, {}});
-    if (waiting_.size() == kBatch) VerifyWaiting();
+    obstacles_.Add(waiting_.back().recorded.certificate.obstacles);
+    if (waiting_.size() == kBatch || obstacles_.AreTooMany()) VerifyWaiting();
   }
 
   CaseResults<Verified> Finish(const BesideCertificates& beside) {
@@ -154,6 +156,7 @@ class Verifying final : public CertificateUser {
       Add(each.recorded, each.verdict,
           each.verdict.status == Status::kConfirmed ? results_.counts : results_.told[each.number]);
     waiting_.clear();
+    obstacles_ = {};
   }
 
   void Add(const RecordedCertificate& recorded, const Verdict& verdict, Verified& to) {
@@ -173,6 +176,7 @@ class Verifying final : public CertificateUser {
   const Shard shard_;
   std::map<const Problem*, Known> known_;
   std::vector<Waiting> waiting_;
+  KeptObstacles obstacles_;  // of these
   bool has_failed_ = false;
   CaseResults<Verified> results_;
 };

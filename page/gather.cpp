@@ -260,15 +260,19 @@ void LastCases::OnDecision(const RecordedDecision& recorded) {
   std::deque<std::int64_t>& kind = is_certified ? certified_ : abstained_;
   kind.push_back(next_);
   // The oldest one's place is used again: rows that lie between freed places would keep the memory from being used.
-  if (kind.size() > (is_certified ? bounds_.certified : bounds_.abstained)) {
-    if (auto oldest = entries_.extract(kind.front())) {
-      oldest.key() = next_;
-      oldest.mapped() = {};
-      entries_.insert(std::move(oldest));
-    }
+  decltype(entries_)::node_type oldest;
+  while (kind.size() > (is_certified ? bounds_.certified : bounds_.abstained) ||
+         (obstacles_.AreTooMany() && kind.size() > 1)) {
+    if ((oldest = entries_.extract(kind.front()))) obstacles_.Remove(*oldest.mapped().recorded.basis.obstacles);
     kind.pop_front();
-    if (kind.empty()) return;
   }
+  if (kind.empty()) return;
+  if (oldest) {
+    oldest.key() = next_;
+    oldest.mapped() = {};
+    entries_.insert(std::move(oldest));
+  }
+  obstacles_.Add(*recorded.basis.obstacles);
   Entry& entry = entries_[next_++];
   entry.recorded = CaseOf(recorded);
   if (is_certified && entry.recorded.missing.empty()) executing_[entry.recorded.candidate->plan_id] = next_ - 1;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "page/page_data.h"
+#include "records/kept_obstacles.h"
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
 #include "records/recorded_case.h"
@@ -58,6 +59,7 @@ class LastCases final : public TimelineUser {
   std::int64_t next_ = 0;
   std::map<std::int64_t, Entry> entries_;
   std::deque<std::int64_t> certified_, abstained_;  // their places
+  KeptObstacles obstacles_;                         // theirs, while the logs are read
   std::map<std::int64_t, std::int64_t> executing_;  // by plan
 };
 

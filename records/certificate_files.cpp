@@ -131,6 +131,7 @@ class CertificateReader final : public TimelineUser {
     certificate.missing = WhyNotJudged(certified.plan, task);
     if (!certificate.missing.empty()) return;
     certificate.certificate = CertificateOf(certified.plan, recorded.basis);
+    kept_.Add(certificate.certificate.obstacles);
     certificate.certificate.cuts = CutsOf(certified.plan, recorded.basis, certifiers_);
     const int n = certified.plan.num_states;
     for (int t = 0; t <= certified.plan.num_steps; ++t) {
@@ -185,6 +186,7 @@ class CertificateReader final : public TimelineUser {
     }
     open.basis = recorded.basis;
     derived = CertificateOf(plan->plan, recorded.basis);  // without slices: under other observations they are others
+    kept_.Add(derived.obstacles);
     derived.controls.conservativeResize(Eigen::NoChange, withdrawal.valid_steps);
     derived.is_remainder = true;
     derived.first_step = withdrawal.first_step;
@@ -252,12 +254,13 @@ class CertificateReader final : public TimelineUser {
   };
 
   Open& OpenOne() {
-    if (open_.size() == kPlansTogether) HandOn();
+    while (open_.size() == kPlansTogether || (kept_.AreTooMany() && open_.size() > 1)) HandOn();
     return open_.emplace_back();
   }
 
   void HandOn() {
     Open& first = open_.front();
+    kept_.Remove(first.recorded.certificate.obstacles);
     user_.OnCertificate(std::move(first.recorded), first.basis ? &*first.basis : nullptr);
     open_.pop_front();
   }
@@ -368,6 +371,7 @@ class CertificateReader final : public TimelineUser {
   BesideCertificates beside_;
   CaseCertifier certifiers_;
   std::deque<Open> open_;
+  KeptObstacles kept_;                     // by these
   std::map<Digest, Decided> decided_;      // by plan
   std::deque<Digest> order_;               // of these plans
   std::deque<Plan> plans_;                 // the last ones

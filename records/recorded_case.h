@@ -11,6 +11,7 @@
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certify/pieces.h"
 #include "forereach/numerics/parallel.h"
+#include "records/kept_obstacles.h"
 #include "records/timeline.h"
 
 namespace forereach {
@@ -98,7 +99,8 @@ class CaseJudge {
   /** Certifies a candidate again, together with others. @pre nothing is missing. */
   void Put(const RecordedCase& recorded, std::size_t place) {
     constexpr std::size_t kBatch = 256;
-    if (waiting_.size() == kBatch) CertifyAgain();
+    if (waiting_.size() == kBatch || obstacles_.AreTooMany()) CertifyAgain();
+    obstacles_.Add(*recorded.basis.obstacles);
     waiting_.push_back({{*recorded.candidate, ScheduleOf(*recorded.candidate, recorded.basis.task->gate),
                          recorded.decision.outcome, recorded.decision.step, place},
                         recorded.basis});
@@ -129,6 +131,7 @@ class CaseJudge {
     for (std::size_t i = 0; i < waiting_.size(); ++i)
       refusals[i].empty() ? Take(waiting_[i].judged) : Refuse(waiting_[i].judged, refusals[i]);
     waiting_.clear();
+    obstacles_ = {};
   }
 
  private:
@@ -152,6 +155,7 @@ class CaseJudge {
 
   std::vector<Follower> followers_;  // one for each thread
   std::vector<Waiting> waiting_;     // not yet certified again
+  KeptObstacles obstacles_;          // of these
 };
 
 }  // namespace forereach

@@ -24,7 +24,7 @@ namespace {
 // A gate that knows what the recorded one knew.
 class GateFollower : public TimelineUser {
  public:
-  [[nodiscard]] bool AsksForLearned() const override { return false; }
+  [[nodiscard]] std::size_t MostLearned() const override { return 0; }
   void OnStart(const Config& task) override { gate_ = std::make_unique<Gate>(task); }
   void OnReload(const Config& task) override {
     const std::unique_ptr<Gate> before = std::exchange(gate_, std::make_unique<Gate>(task));

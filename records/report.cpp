@@ -73,11 +73,14 @@ class PictureMaker final : public TimelineUser, CaseJudge {
     const bool is_certified = decision.outcome == decision_t::CERTIFIED;
     std::deque<RecordedCase>& kind = is_certified ? certified_ : abstained_;
     if (is_certified) executed_.try_emplace(decision.plan_id);
+    obstacles_.Add(*judged.basis.obstacles);
     kind.push_back(std::move(judged));
-    if (kind.size() <= LogPicture::kMostTubes) return;
-    if (is_certified) executed_.erase(kind.front().decision.plan_id);
-    kind.pop_front();
-    ++result_.earlier;
+    while (kind.size() > LogPicture::kMostTubes || (obstacles_.AreTooMany() && kind.size() > 1)) {
+      if (is_certified) executed_.erase(kind.front().decision.plan_id);
+      obstacles_.Remove(*kind.front().basis.obstacles);
+      kind.pop_front();
+      ++result_.earlier;
+    }
   }
 
   void OnEvent(const LogEvent& event) override {
@@ -171,6 +174,7 @@ class PictureMaker final : public TimelineUser, CaseJudge {
   std::optional<Eigen::Vector2d> last_body_;        // where one was drawn
   std::map<std::int64_t, std::set<int>> executed_;  // of certified plans that may be drawn, by plan_id: the steps
   std::deque<RecordedCase> certified_, abstained_;  // that may be drawn
+  KeptObstacles obstacles_;                         // of these
   Thinned<Eigen::Vector2d> path_, stops_;
   Thinned<std::vector<Picture::Polygon>> bodies_;
   bool arrived_ = false;
@@ -286,8 +290,7 @@ bool Report(const ReportOptions& options, std::ostream& out) {
     out << fmt::format("{:<26}{} (this task file decides them otherwise than the log)\n", "tubes left out",
                        drawn.disagreements);
   if (drawn.earlier > 0)
-    out << fmt::format("{:<26}{} before the last {} of their kind\n", "tubes not drawn", drawn.earlier,
-                       LogPicture::kMostTubes);
+    out << fmt::format("{:<26}{} before the last ones of their kind\n", "tubes not drawn", drawn.earlier);
   return is_whole;
 }
 

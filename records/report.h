@@ -17,7 +17,8 @@ struct LogPicture {
   Picture picture;
   /** Plans whose recomputed outcome or step differs from the recorded one. Their tubes are not drawn. */
   int disagreements = 0;
-  /** Tubes of certificates, and of abstentions, that are not drawn since so many of their kind follow. */
+  /** Tubes of certificates, and of abstentions, that are not drawn since so many of their kind follow, or too many
+  obstacles (kept_obstacles.h). */
   static constexpr std::size_t kMostTubes = 750;
   std::int64_t earlier = 0;
 };

@@ -94,12 +94,21 @@ void ShadowTally::OnDecision(const RecordedDecision& recorded) {
   else
     ++summary_.refused[std::string(CauseName(decision.cause))];
   if (decision.plan_id == driven_) EndPlan();
-  if (!plans_.insert_or_assign(decision.plan_id, Plan{CaseOf(recorded), is_certified}).second) return;
+  obstacles_.Add(*recorded.basis.obstacles);
+  if (const auto known = plans_.find(decision.plan_id); known != plans_.end()) {
+    obstacles_.Remove(*known->second.recorded.basis.obstacles);
+    known->second = Plan{CaseOf(recorded), is_certified};
+    return;
+  }
+  plans_.emplace(decision.plan_id, Plan{CaseOf(recorded), is_certified});
   order_.push_back(decision.plan_id);
-  if (order_.size() <= kMostPlans) return;
-  if (order_.front() == driven_) EndPlan();
-  plans_.erase(order_.front());
-  order_.pop_front();
+  while (order_.size() > kMostPlans || (obstacles_.AreTooMany() && order_.size() > 1)) {
+    if (order_.front() == driven_) EndPlan();
+    const auto first = plans_.find(order_.front());
+    obstacles_.Remove(*first->second.recorded.basis.obstacles);
+    plans_.erase(first);
+    order_.pop_front();
+  }
 }
 
 void ShadowTally::OnEvent(const LogEvent& event) {

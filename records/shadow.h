@@ -13,6 +13,7 @@
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/angle.h"
+#include "records/kept_obstacles.h"
 #include "records/recorded_case.h"
 #include "records/timeline.h"
 
@@ -86,6 +87,7 @@ class ShadowTally final : public TimelineUser, CaseJudge {
   BusOptions channels_;
   std::map<std::int64_t, Plan> plans_;  // by plan_id
   std::deque<std::int64_t> order_;
+  KeptObstacles obstacles_;              // of these plans
   std::int64_t driven_ = -1;             // the plan that the robot executes; -1: none of plans_
   bool is_driven_certified_ = false;     // of it
   std::map<std::size_t, Drive> drives_;  // that wait to be compared, by place

@@ -53,18 +53,21 @@ std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>&
 
 std::shared_ptr<const Problem> Basis::problem() const { return WithLearned(task->problem, *learned, num_learned); }
 
-Timeline::Timeline(const Config& first, TaskFinder find, std::vector<TimelineUser*> users)
+Timeline::Timeline(const Config& first, TaskFinder find, std::optional<KeyRing> keys, std::vector<TimelineUser*> users,
+                   const TimelineBounds& bounds)
     : find_(std::move(find)),
       users_(std::move(users)),
-      keeps_learned_(std::ranges::any_of(users_, &TimelineUser::AsksForLearned)),
+      most_learned_((*std::ranges::max_element(users_, {}, &TimelineUser::MostLearned))->MostLearned()),
+      bounds_(bounds),
       channels_(first.bus),
-      authenticator_(channels_, PublicKeysOf(channels_)),
+      authenticator_(channels_, std::move(keys)),
       now_(&first),
+      undecided_(bounds.undecided),
+      decided_obstacles_(bounds.obstacles),
       logged_obstacles_(first),
       transition_sender_(Microseconds(first.gate.robot_timeout_ms)) {}
 
 void Timeline::Read(const std::vector<std::string>& logs, bool names_files) {
-  if (!has_begun_) Start();
   damage_ += ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) {
     const std::string file = names_files ? std::filesystem::path(log).filename().string() + " " : "";
     Take(event, fmt::format("{}event {}", file, event.number));
@@ -76,6 +79,7 @@ void Timeline::End() {
 }
 
 void Timeline::Take(const LogEvent& event, const std::string& name) {
+  if (!has_begun_) Start();
   if (!authenticator_.IsAuthentic(event)) return;
   ++place_;
   Tell(&TimelineUser::OnEvent, event);
@@ -140,6 +144,7 @@ void Timeline::TakeStatus(const LogEvent& event) {
 void Timeline::Start() {
   has_begun_ = true;
   obstacles_ahead_.clear();
+  kept_ahead_ = KeptObstacles(bounds_.obstacles);
   transition_sender_ = SoleSender(0);
   Follow(ObstaclesInForce(*now_));
   Tell(&TimelineUser::OnStart, *now_);
@@ -183,6 +188,9 @@ void Timeline::TakeObstacles(const LogEvent& event) {
   if (after == before && !was_partial && !logged_obstacles_.is_partial()) return;  // one set is sent again and again
   obstacles_ahead_.push_back(
       {place_, event.utime, event.sender(), {event.message().begin(), event.message().end()}, after, all_logged_});
+  kept_ahead_.Add(*all_logged_);
+  while (obstacles_ahead_.size() > bounds_.ahead || (kept_ahead_.AreTooMany() && obstacles_ahead_.size() > 1))
+    TakeNextObstacles();
 }
 
 void Timeline::TakeTransition(const LogEvent& event, const std::string& name) {
@@ -195,11 +203,13 @@ void Timeline::TakeTransition(const LogEvent& event, const std::string& name) {
   logged_observations_ = ChainedDigest(logged_observations_, event.message());
   transitions_ahead_.push_back(
       {place_, std::move(transition), {event.message().begin(), event.message().end()}, logged_observations_});
+  if (transitions_ahead_.size() > bounds_.ahead) LearnNext();
 }
 
 void Timeline::TakeNextObstacles() {
   const ObstaclesChange change = std::move(obstacles_ahead_.front());
   obstacles_ahead_.pop_front();
+  kept_ahead_.Remove(*change.obstacles);
   obstacles_digest_ = change.after;
   obstacles_ = change.obstacles;
   Tell(&TimelineUser::OnObstacles, change.bytes, change.utime, change.sender);
@@ -210,7 +220,7 @@ void Timeline::LearnNext() {
   transitions_ahead_.pop_front();
   observations_digest_ = next.after;
   Tell(&TimelineUser::OnTransition, next.transition, next.bytes);
-  if (keeps_learned_) learned_->Add(next.transition.z, next.transition.next, next.transition.longer);
+  if (learned_->size() < most_learned_) learned_->Add(next.transition.z, next.transition.next, next.transition.longer);
 }
 
 // ---- Decisions.
@@ -248,10 +258,16 @@ void Timeline::TakeDecision(const LogEvent& event, const std::string& name) {
   recorded.basis =
       task ? Advance(GroundsOf(*decision), recorded.candidate ? recorded.candidate->place : -1) : Current();
   const auto [decided, is_new] = decided_.try_emplace(plan, Decided{recorded.basis, recorded.candidate.has_value()});
-  if (is_new) decided_order_.push_back(plan);
-  if (recorded.candidate && decision->outcome == decision_t::CERTIFIED) decided->second = {recorded.basis, true};
-  if (decided_order_.size() > kMostDecided) {
-    decided_.erase(decided_order_.front());
+  if (is_new) decided_order_.push_back(plan), decided_obstacles_.Add(*recorded.basis.obstacles);
+  if (recorded.candidate && decision->outcome == decision_t::CERTIFIED) {
+    decided_obstacles_.Add(*recorded.basis.obstacles);
+    decided_obstacles_.Remove(*decided->second.basis.obstacles);
+    decided->second = {recorded.basis, true};
+  }
+  while (decided_order_.size() > kMostDecided || (decided_obstacles_.AreTooMany() && decided_order_.size() > 1)) {
+    const auto first = decided_.find(decided_order_.front());
+    decided_obstacles_.Remove(*first->second.basis.obstacles);
+    decided_.erase(first);
     decided_order_.pop_front();
   }
   Tell(&TimelineUser::OnDecision, recorded);

@@ -15,12 +15,14 @@ received and learned. A reload forgets what was learned. Heartbeats of a certifi
 **Grounds.** The log may contain a message that the certifier received only after its decision. A decision names the
 digests of its obstacles and observations. So for each of the two the timeline advances from the state of the previous
 decision to the first logged state with that digest. If there is none, it advances to the last state that was logged
-before the candidate; then the digests of the basis differ from those that the decision names. */
+before the candidate; then the digests of the basis differ from those that the decision names. What too many later
+messages followed counts as received (TimelineBounds). */
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -37,6 +39,7 @@ before the candidate; then the digests of the basis differ from those that the d
 #include "lcmtypes/grounds.h"
 #include "lcmtypes/stream_order.h"
 #include "records/event_log.h"
+#include "records/kept_obstacles.h"
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
 #include "records/undecided.h"
@@ -50,7 +53,7 @@ struct Basis {
   Grounds grounds;  ///< The digests of these inputs. The decision's message has the digests that it names.
   std::shared_ptr<const std::vector<Obstacle>> obstacles;
   /** What is learned between the last start or reload and the next, in the order of the log, of which the first
-  num_learned were at that time. Empty if no user asks for it. */
+  num_learned were at that time. No more than a user asks for. */
   std::shared_ptr<const LearnedTransitions> learned;
   std::size_t num_learned = 0;
 
@@ -100,8 +103,8 @@ class TimelineUser {
   TimelineUser(const TimelineUser&) = delete;
   TimelineUser& operator=(const TimelineUser&) = delete;
 
-  /** Whether it looks at Basis::learned, which a long run has much of. */
-  [[nodiscard]] virtual bool AsksForLearned() const { return true; }
+  /** How many of Basis::learned it looks at, which a long run has much of. */
+  [[nodiscard]] virtual std::size_t MostLearned() const { return std::numeric_limits<std::size_t>::max(); }
 
   virtual void OnEvent(const LogEvent&) {}  ///< Every authentic message, before the calls that it causes.
   virtual void OnStart(const Config&) {}    ///< The process starts under this task.
@@ -114,7 +117,7 @@ class TimelineUser {
   virtual void OnDecision(const RecordedDecision&) {}
   virtual void OnCertified(const RecordedPlan&) {}
   virtual void OnWithdrawn(const RecordedWithdrawal&) {}
-  virtual void OnUndecided(const RecordedCandidate&) {}  ///< No decision follows, or one after kMostUndecided others.
+  virtual void OnUndecided(const RecordedCandidate&) {}  ///< No decision follows, or one after too many others.
 };
 
 /** These transitions and behind them the first `count` that were learned. */
@@ -123,31 +126,40 @@ class TimelineUser {
 [[nodiscard]] std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>& problem,
                                                          const LearnedTransitions& learned, std::size_t count);
 
+/** What is kept of a run of any length. */
+struct TimelineBounds {
+  std::size_t undecided = 4096;  ///< Candidates that may wait for their decisions; more, and the oldest is undecided.
+  std::size_t ahead = 4096;      ///< Messages with obstacles that no decision has named so far, and transitions.
+  /** In sets that no decision has named so far, and in those of the last decisions. */
+  std::size_t obstacles = KeptObstacles::kMost;
+};
+
 class Timeline final {
  public:
   /** The task of a config digest; null if it is not known. */
   using TaskFinder = std::function<const Config*(const Digest& config)>;
 
-  /** @param first the task in force at the beginning. Channels and key are its.
-  @param users each is told of every event. They must outlive the timeline, as the tasks must.
-  @throws KeyError if the key cannot be read. */
-  Timeline(const Config& first, TaskFinder find, std::vector<TimelineUser*> users);
+  /** @param first the task in force at the beginning. Channels are its. @param keys as LogAuthenticator's.
+  @param users each is told of every event. They must outlive the timeline, as the tasks must. */
+  Timeline(const Config& first, TaskFinder find, std::optional<KeyRing> keys, std::vector<TimelineUser*> users,
+           const TimelineBounds& bounds = {});
+  /** With the key of the first task. @throws KeyError if it cannot be read. */
   Timeline(LogTasks& tasks, std::vector<TimelineUser*> users)
       : Timeline(
-            tasks.first(), [&tasks](const Digest& config) { return tasks.Find(config); }, std::move(users)) {}
+            tasks.first(), [&tasks](const Digest& config) { return tasks.Find(config); },
+            PublicKeysOf(tasks.first().bus), std::move(users)) {}
   /** Decisions of any config digest count as this task's. */
   Timeline(const Config& only, std::vector<TimelineUser*> users)
       : Timeline(
-            only, [&only](const Digest&) { return &only; }, std::move(users)) {}
+            only, [&only](const Digest&) { return &only; }, PublicKeysOf(only.bus), std::move(users)) {}
 
   /** Reads consecutive event logs of one run, which follow those that were read before.
   @param names_files whether names of events include the log's name. @throws LogError if a log cannot be read. */
   void Read(const std::vector<std::string>& logs, bool names_files);
+  /** The next event. @param name what users are told it is called. */
+  void Take(const LogEvent& event, const std::string& name);
   /** Tells of the candidates that wait for a decision. */
   void End();
-
-  /** Candidates that may wait for their decisions; of more, the oldest count as undecided. */
-  static constexpr std::size_t kMostUndecided = 4096;
 
   [[nodiscard]] const LogDamage& damage() const { return damage_; }
   [[nodiscard]] PassedOver passed_over() const { return {authenticator_.refusals(), undecodable_}; }
@@ -182,7 +194,6 @@ class Timeline final {
     Digest after;  // of the observations
   };
 
-  void Take(const LogEvent& event, const std::string& name);
   void TakeObstacles(const LogEvent& event);
   void TakeTransition(const LogEvent& event, const std::string& name);
   void TakeStatus(const LogEvent& event);
@@ -209,7 +220,8 @@ class Timeline final {
 
   const TaskFinder find_;
   const std::vector<TimelineUser*> users_;
-  const bool keeps_learned_;
+  const std::size_t most_learned_;
+  const TimelineBounds bounds_;
   const BusOptions channels_;
   LogAuthenticator authenticator_;
 
@@ -221,12 +233,13 @@ class Timeline final {
 
   std::int64_t place_ = 0, undecodable_ = 0, candidates_ = 0;
   LogDamage damage_;
-  Undecided<RecordedCandidate> undecided_{kMostUndecided};
+  Undecided<RecordedCandidate> undecided_;
   // Of the last kMostDecided plans that were decided on; of several decisions on one the last CERTIFIED, if there is
   // one.
   static constexpr std::size_t kMostDecided = 4096;
   std::map<Digest, Decided> decided_;
   std::deque<Digest> decided_order_;
+  KeptObstacles decided_obstacles_;  // of these
 
   RepeatedWithdrawals withdrawals_;
 
@@ -239,6 +252,7 @@ class Timeline final {
   SoleSender transition_sender_;
   Digest logged_observations_{};
   std::deque<ObstaclesChange> obstacles_ahead_;
+  KeptObstacles kept_ahead_;  // by these
   std::deque<Transition> transitions_ahead_;
 };
 

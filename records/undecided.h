@@ -1,12 +1,12 @@
 /** Messages of a log that belong together: candidates without a decision so far, and repetitions of a withdrawal. */
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "forereach/certified_plan_t.hpp"
@@ -94,16 +94,19 @@ class RepeatedWithdrawals final {
   [[nodiscard]] bool IsFirst(withdrawal_t withdrawal) {
     withdrawal.utime = withdrawal.sequence = 0;
     const Digest digest = DigestOf(Encode(withdrawal));
-    if (std::ranges::find(last_, digest) != last_.end()) return false;
-    if (last_.size() == kMost) last_.pop_front();
+    if (!known_.insert(digest).second) return false;
     last_.push_back(digest);
+    if (last_.size() <= kMost) return true;
+    known_.erase(last_.front());
+    last_.pop_front();
     return true;
   }
 
  private:
   static constexpr std::size_t kMost = 4096;  // which may be repeated at one time
 
-  std::deque<Digest> last_;
+  std::set<Digest> known_;
+  std::deque<Digest> last_;  // of these
 };
 
 }  // namespace forereach

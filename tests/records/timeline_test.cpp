@@ -5,7 +5,9 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_sender.h"
+#include "forereach/safety/occupancy_grid.h"
 #include "lcmtypes/names.h"
+#include "records/kept_obstacles.h"
 #include "records/replay.h"
 #include "records/report.h"
 #include "task/step_time.h"
@@ -98,6 +100,7 @@ struct TimelineTest : testing::Test {
     const GateAnswer answer = gate_->Decide(Encode(candidate_), ++now_);
     ASSERT_TRUE(answer.certified) << GetText(answer.decision.message);
     Append(config_.bus.certified, *answer.certified);
+    if (certified_ == 0) first_certified_ = *answer.certified;
     Append(config_.bus.decision, answer.decision);
     ++certified_;
   }
@@ -174,6 +177,7 @@ struct TimelineTest : testing::Test {
   std::vector<std::string> logs_;
   std::unique_ptr<EventLogWriter> writer_;
   candidate_plan_t candidate_{};
+  certified_plan_t first_certified_{};
   std::int64_t now_ = kStart, obstacles_ = 0, transitions_ = 0, off_us_ = 0;
   int certified_ = 0;
 };
@@ -223,6 +227,108 @@ TEST_F(TimelineTest, ReconstructsGroundsAcrossFilesRestartsAndReloads) {
   Reload(1, 2);
   Certify();
   ExpectAllAgree();
+}
+
+struct Keeper final : TimelineUser {
+  [[nodiscard]] std::size_t MostLearned() const override { return 7; }
+  void OnEvent(const LogEvent& event) override { candidates += Decoded<candidate_plan_t>(event.message()) ? 1 : 0; }
+  void OnObstacles(Bytes, std::int64_t, SenderId) override { sets_ahead += candidates == 0 ? 1 : 0; }
+  void OnTransition(const ExecutedTransition&, Bytes) override { learned_ahead += candidates == 0 ? 1 : 0; }
+  void OnDecision(const RecordedDecision& recorded) override {
+    EXPECT_EQ(recorded.basis.grounds, GroundsOf(recorded.decision)) << recorded.event;
+    sets.push_back(recorded.basis.obstacles);
+    num_learned = recorded.basis.num_learned;
+  }
+  void OnCertified(const RecordedPlan& recorded) override {
+    has_grounds.push_back(recorded.basis.grounds == GroundsOf(recorded.certified));
+  }
+  void OnUndecided(const RecordedCandidate&) override { ++undecided; }
+
+  // Reads the fixture's logs.
+  void Read(const Config& task, const std::vector<std::string>& logs, const TimelineBounds& bounds) {
+    Timeline timeline(
+        task, [&](const Digest&) { return &task; }, {}, {this}, bounds);
+    timeline.Read(logs, true);
+    alive = std::ranges::count_if(sets, [](const auto& set) { return !set.expired(); });
+  }
+
+  int candidates = 0, sets_ahead = 0, learned_ahead = 0, undecided = 0;
+  std::int64_t alive = 0;
+  std::size_t num_learned = 0;
+  std::vector<std::weak_ptr<const std::vector<Obstacle>>> sets;  // of each decision
+  std::vector<bool> has_grounds;                                 // each certified plan
+};
+
+TEST_F(TimelineTest, TheSetsOfTheLastDecisionsAreKeptAsFarAsThereIsRoom) {
+  Restart();
+  for (int i = 0; i < 12; ++i) {
+    Obstacles(60 + i);
+    Certify();
+  }
+  Append(config_.bus.certified, first_certified_);
+  const std::size_t each = config_.obstacles.size() + 1;
+  for (const auto& [room, kept] : {std::pair{5 * each, 5}, {5 * each - 1, 4}, {100 * each, 12}, {std::size_t{0}, 1}}) {
+    Keeper keeper;
+    keeper.Read(config_, logs_, {.obstacles = room});
+    EXPECT_EQ(keeper.alive, kept) << room;
+    ASSERT_EQ(std::ssize(keeper.has_grounds), 13);
+    // The first one comes again. Where its set is forgotten, it does not get another one's digest.
+    EXPECT_EQ(std::ranges::count(keeper.has_grounds, true), kept == 12 ? 13 : 12) << room;
+    EXPECT_EQ(keeper.has_grounds.back(), kept == 12) << room;
+  }
+}
+
+TEST_F(TimelineTest, WhatTooManyMessagesFollowCountsAsReceived) {
+  Restart();
+  for (int i = 0; i < 12; ++i) Obstacles(60 + i), Transition();
+  Certify();
+  const std::size_t each = config_.obstacles.size() + 1;
+  for (const auto& [bounds, sets, learned] : {std::tuple{TimelineBounds{}, 0, 0},
+                                              {TimelineBounds{.ahead = 12}, 0, 0},
+                                              {TimelineBounds{.ahead = 11}, 1, 1},
+                                              {TimelineBounds{.ahead = 0}, 12, 12},
+                                              {TimelineBounds{.obstacles = 5 * each}, 7, 0},
+                                              {TimelineBounds{.obstacles = 0}, 11, 0}}) {
+    Keeper keeper;
+    keeper.Read(config_, logs_, bounds);
+    EXPECT_FIELDS(keeper, (sets_ahead, sets), (learned_ahead, learned), (num_learned, 7u), (undecided, 0));
+    EXPECT_THAT(keeper.has_grounds, ElementsAre(true));
+  }
+}
+
+TEST_F(TimelineTest, OfTooManyCandidatesTheOldestAreUndecided) {
+  Restart();
+  for (int i = 0; i < 3; ++i, ++candidate_.plan_id) Append(config_.bus.candidate, candidate_);
+  Certify();
+  for (const auto& [most, undecided] : {std::pair{4, 0}, {3, 1}, {1, 3}}) {
+    Keeper keeper;
+    keeper.Read(config_, logs_, {.undecided = static_cast<std::size_t>(most)});
+    EXPECT_EQ(keeper.undecided, undecided);
+    EXPECT_THAT(keeper.has_grounds, ElementsAre(true));
+  }
+}
+
+TEST(KeptObstaclesTest, CountsASetAndAGridOnce) {
+  const GridMap map{1, {0, 0}, 0, 3, 1, {true, false, true}, true};
+  const Obstacle grid = Obstacle::Grid(std::make_shared<const OccupancyGrid>(map));
+  const Obstacle circle = Obstacle::Circle(Eigen::Vector2d(0, 0), 1);
+  const std::vector<Obstacle> one{grid, circle}, other{circle, circle, grid}, none;
+  KeptObstacles kept(6);
+  kept.Add(none);
+  kept.Add(one);
+  kept.Add(one);
+  EXPECT_EQ(kept.size(), 4u);
+  EXPECT_FALSE(kept.AreTooMany());
+  kept.Add(other);
+  EXPECT_EQ(kept.size(), 7u);
+  EXPECT_TRUE(kept.AreTooMany());
+  kept.Remove(one);
+  EXPECT_EQ(kept.size(), 7u) << "it is still kept elsewhere";
+  kept.Remove(one);
+  EXPECT_EQ(kept.size(), 5u) << "the other has the grid, too";
+  kept.Remove(other);
+  kept.Remove(none);
+  EXPECT_EQ(kept.size(), 0u);
 }
 
 // By the parts of a set, too: where it changes, where it is complete, and where it never is.
