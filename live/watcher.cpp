@@ -32,7 +32,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::size_t kBytesOfATube = 400'000;
-constexpr std::size_t kMostLearned = 200'000;
+constexpr TimelineBounds kBounds{.undecided = 64, .ahead = 1024, .obstacles = 1 << 16};
 constexpr std::uint64_t kReadsAgainAfterUs = 2'000'000;
 constexpr std::uint64_t kForgetsAfterUs = 3'000'000;  // that a certifier was in charge
 constexpr std::size_t kInATick = 2 * Watcher::kDecisions;
@@ -42,12 +42,10 @@ std::uint64_t TimeApart(std::int64_t a, std::int64_t b) {
   return static_cast<std::uint64_t>(std::max(a, b)) - static_cast<std::uint64_t>(std::min(a, b));
 }
 
-std::vector<std::uint8_t> Copy(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
-
 // What a signature names, if the task gives the bus no name: address and port.
-BusOptions Named(BusOptions options) {
-  options.name = options.bus_name();
-  return options;
+std::shared_ptr<const Config> Named(Config task) {
+  task.bus.name = task.bus.bus_name();
+  return std::make_shared<const Config>(std::move(task));
 }
 
 // Integers as text: a browser has no exact ones beyond 2^53.
@@ -86,28 +84,38 @@ void LiveFeed::Append(std::int64_t from, std::int64_t to, std::string& out) cons
 // ---- What is heard.
 
 Watcher::Watcher(Config task, std::optional<KeyRing> keys, ReadAgain read_again)
-    : task_(std::move(task)),
+    : tasks_{Named(std::move(task))},
       keys_(std::move(keys)),
       read_again_(std::move(read_again)),
-      authenticator_(Named(task_.bus), keys_),
-      interpreter_(task_.bus, ""),
-      tube_(std::make_unique<Tube>()) {
-  UseTask(std::move(task_));
+      interpreter_(this->task().bus, ""),
+      timeline_(
+          this->task(), [this](const Digest& config) { return Find(config); }, keys_, {this}, kBounds),
+      tube_(std::make_unique<Tube>()) {}
+
+// The certifier may run another task than this: the file may have been reloaded.
+const Config* Watcher::Find(const Digest& config) {
+  if (config == task().grounds.config) {
+    other_task_.clear();
+    return &task();
+  }
+  if (config == tried_ || (tried_us_ != 0 && TimeApart(now_us_, tried_us_) < kReadsAgainAfterUs)) return nullptr;
+  tried_ = config;
+  tried_us_ = now_us_;
+  other_task_ = "the certifier's task file is not " + task().path + " as it is now: tubes and names may be wrong";
+  try {
+    auto again = Named(read_again_());
+    if (again->grounds.config != config || again->bus != task().bus) return nullptr;
+    tasks_.push_back(std::move(again));
+    other_task_.clear();
+    return &task();
+  } catch (const std::exception& error) {
+    other_task_ += " (" + WhyFailed(error) + ")";
+    return nullptr;
+  }
 }
 
-void Watcher::UseTask(Config task) {
-  auto certifier = std::make_unique<Certifier>(task.problem);
-  ObstaclesInForce in_force(task);
-  if (in_force_) in_force.Inherit(*in_force_);
-  certifier_ = std::move(certifier);
-  task_ = std::move(task);
-  in_force_.emplace(std::move(in_force));
-  ShowObstacles();
-  other_task_.clear();
-}
-
-void Watcher::Take(const LogEvent& event) {
-  if (!authenticator_.IsAuthentic(event)) return;
+void Watcher::OnEvent(const LogEvent& event) {
+  now_us_ = event.utime;
   ++counts_.messages;
   TakeRows(event);
   if (!TakeMessage(event)) ++counts_.undecodable;
@@ -124,7 +132,7 @@ void Watcher::TakeRows(const LogEvent& event) {
       decided_.erase(decided_.begin());
       ++skipped_;
     }
-    decided_.push_back({.decision = {}, .row = std::move(row), .candidate = {}, .certificate = {}, .obstacles = {}});
+    decided_.push_back({std::move(row)});
   }
   for (const EventRow& row : rows.events)
     Add(kEventFeed, {{"utime", row.utime},
@@ -145,54 +153,36 @@ void Watcher::TakeRows(const LogEvent& event) {
 
 // False: no message of its channel's type.
 bool Watcher::TakeMessage(const LogEvent& event) {
-  const BusOptions& channels = task_.bus;
-  if (event.channel == channels.candidate) {
-    if (!Decoded<candidate_plan_t>(event.message()) && !Decoded<candidate_batch_t>(event.message())) return false;
-    candidates_.Add(KeyOfCandidates(event.message()), Copy(event.message()));
-    return true;
-  }
-  if (event.channel == channels.certified) {
-    const auto certified = Decoded<certified_plan_t>(event.message());
-    if (!certified) return false;
-    certificates_.Add(GetDigest(certified->plan_digest), Copy(event.message()));
-    return true;
-  }
-  if (event.channel == channels.decision) return TakeDecision(event);
+  const BusOptions& channels = task().bus;
   if (event.channel == channels.robot_state) return TakeState(event);
   if (event.channel == channels.status) return TakeStatus(event);
-  if (event.channel == channels.obstacles) return TakeObstacles(event);
-  if (event.channel == channels.transition) return TakeTransition(event);
   if (event.channel == channels.fault) return TakeFault(event);
-  if (event.channel == channels.withdrawn) return TakeWithdrawal(event);
-  if (event.channel == channels.event) return Decoded<execution_event_t>(event.message()).has_value();
   if (event.channel == channels.logger_status) {
     const auto status = Decoded<logger_status_t>(event.message());
     if (status) logger_.emplace(event.utime, *status);
     return status.has_value();
   }
-  return true;  // commands and advice are for others
+  return event.channel == channels.command || interpreter_.Identify(event.channel, event.message()).second;
 }
 
-bool Watcher::TakeDecision(const LogEvent& event) {
-  const auto decision = Decoded<decision_t>(event.message());
-  if (!decision) return false;
+void Watcher::OnDecision(const RecordedDecision& recorded) {
   Decided& decided = decided_.back();  // its row was made just now
-  const PlanKeys keys(*decision);
-  decided.decision = *decision;
-  if (const auto message = candidates_.Take(keys)) decided.candidate = CandidateIn(*message, keys.plan);
-  decided.certificate = certificates_.Take(keys.plan);
-  decided.obstacles = obstacles_;
-  if (decision->outcome != decision_t::REJECTED) ReadAgainFor(GetDigest(decision->config_digest), event.utime);
-  return true;
+  decided.recorded = recorded;
+  decided.certificate = certificates_.Take(GetDigest(recorded.decision.plan_digest)).value_or(nullptr);
+}
+
+void Watcher::OnCertified(const RecordedPlan& recorded) {
+  certificates_.Add(GetDigest(recorded.certified.plan_digest),
+                    std::make_shared<const certified_plan_t>(recorded.certified));
 }
 
 bool Watcher::TakeState(const LogEvent& event) {
   const auto state = Decoded<robot_state_t>(event.message());
-  if (!state || !FaultOf(*state, task_.problem->model->num_states()).empty()) return false;
+  if (!state || !FaultOf(*state, task().problem->model->num_states()).empty()) return false;
   state_.emplace(event.utime, *state);
-  if (task_.problem->projection.rows() != 2) return true;
+  if (task().problem->projection.rows() != 2) return true;
   const Eigen::Vector2d at =
-      task_.problem->projection * Eigen::Map<const Eigen::VectorXd>(state->state, state->num_states);
+      task().problem->projection * Eigen::Map<const Eigen::VectorXd>(state->state, state->num_states);
   if (Svg::CanBeDrawn(at)) Add(kPlaceFeed, {at.x(), at.y(), Text(state->executing_plan_id), state->executing_step});
   return true;
 }
@@ -203,65 +193,26 @@ bool Watcher::TakeStatus(const LogEvent& event) {
   const bool keeps = status_ && IsInCharge(status_->second) && TimeApart(event.utime, status_->first) < kForgetsAfterUs;
   if (!IsInCharge(*status) && keeps) return true;  // another one stands by
   status_.emplace(event.utime, *status);
-  if (IsInCharge(*status)) ReadAgainFor(GetDigest(status->config_digest), event.utime);
+  if (IsInCharge(*status)) static_cast<void>(Find(GetDigest(status->config_digest)));
   return true;
-}
-
-// The certifier runs another task than this: the file may have been reloaded.
-void Watcher::ReadAgainFor(const Digest& config, std::int64_t now_us) {
-  if (config == task_.grounds.config) {
-    other_task_.clear();
-    return;
-  }
-  if (config == tried_ || (tried_us_ != 0 && TimeApart(now_us, tried_us_) < kReadsAgainAfterUs)) return;
-  tried_ = config;
-  tried_us_ = now_us;
-  other_task_ = "the certifier's task file is not " + task_.path + " as it is now: tubes and names may be wrong";
-  try {
-    Config again = read_again_();
-    if (again.grounds.config == config && again.bus == task_.bus) UseTask(std::move(again));
-  } catch (const std::exception& error) {
-    other_task_ += " (" + WhyFailed(error) + ")";
-  }
-}
-
-void Watcher::ShowObstacles() {
-  obstacles_ = std::make_shared<const std::vector<Obstacle>>(in_force_->all());
-  obstacles_digest_ = in_force_->digest();
 }
 
 // As they are now, and where they will be.
 std::string Watcher::ObstaclesSvg(std::int64_t now_us) const {
   const auto now = static_cast<double>(now_us);
+  const std::vector<Obstacle>& obstacles = timeline_.logged_obstacles();
   Eigen::AlignedBox2d frame = frame_;
   if (!Svg::CanBeDrawn(frame))
-    for (const Obstacle& obstacle : *obstacles_)
+    for (const Obstacle& obstacle : obstacles)
       if (const auto place = PlaceOf(obstacle, now); place && obstacle.dim() == 2)
         for (const Eigen::Vector2d& point : place->points)
           if (Svg::CanBeDrawn(point)) frame.extend(point);
   Svg svg(frame.isEmpty() ? Eigen::AlignedBox2d(Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 1)) : frame);
-  DrawObstacles(*obstacles_, {now}, frame, -1, false, svg);
-  for (const Obstacle& obstacle : *obstacles_)
+  DrawObstacles(obstacles, {now}, frame, -1, false, svg);
+  for (const Obstacle& obstacle : obstacles)
     if (obstacle.dim() == 2)
       for (const Svg::Points& outline : PredictionOf(obstacle, now_us)) svg.Polygon(outline, "class=\"prediction\"");
   return svg.Done();
-}
-
-bool Watcher::TakeObstacles(const LogEvent& event) {
-  const std::string refusal = in_force_->Update(event.message(), event.utime, event.sender());
-  if (!refusal.empty()) return false;
-  if (in_force_->digest() != obstacles_digest_) ShowObstacles();
-  return true;
-}
-
-bool Watcher::TakeTransition(const LogEvent& event) {
-  const auto message = Decoded<transition_t>(event.message());
-  if (!message) return false;
-  if (!task_.gate.learns || certifier_->num_observations() >= kMostLearned) return true;
-  const ExecutedTransition transition = Examine(*message, *task_.problem, task_.gate);
-  if (transition.refusal.empty())
-    static_cast<void>(certifier_->Learn(transition.z, transition.next, transition.longer));
-  return true;
 }
 
 bool Watcher::TakeFault(const LogEvent& event) {
@@ -275,16 +226,13 @@ bool Watcher::TakeFault(const LogEvent& event) {
   return true;
 }
 
-bool Watcher::TakeWithdrawal(const LogEvent& event) {
-  const auto withdrawal = Decoded<withdrawal_t>(event.message());
-  if (!withdrawal) return false;
-  if (IsRepeated(withdrawals_, withdrawal->plan_id, withdrawal->valid_steps)) return true;
-  Add(kWithdrawalFeed, {{"utime", withdrawal->utime},
-                        {"plan", Text(withdrawal->plan_id)},
-                        {"kind", WithdrawalName(withdrawal->cause)},
-                        {"steps", withdrawal->valid_steps},
-                        {"message", GetText(withdrawal->message)}});
-  return true;
+void Watcher::OnWithdrawn(const RecordedWithdrawal& recorded) {
+  const withdrawal_t& withdrawal = recorded.withdrawal;
+  Add(kWithdrawalFeed, {{"utime", withdrawal.utime},
+                        {"plan", Text(withdrawal.plan_id)},
+                        {"kind", WithdrawalName(withdrawal.cause)},
+                        {"steps", withdrawal.valid_steps},
+                        {"message", GetText(withdrawal.message)}});
 }
 
 void Watcher::Add(Feed feed, const Json& record) {
@@ -301,7 +249,7 @@ std::vector<bool> Watcher::ChooseDrawn() const {
   int room = kTubesInATick;
   for (const bool wants_certified : {true, false})
     for (std::size_t i = decided_.size(); i-- > 0 && room > 0;) {
-      const decision_t& decision = decided_[i].decision;
+      const decision_t& decision = decided_[i].recorded.decision;
       const bool is_certified = decision.outcome == decision_t::CERTIFIED;
       if (is_certified != wants_certified || !IsJudged(decision)) continue;
       chosen[i] = true;
@@ -311,26 +259,28 @@ std::vector<bool> Watcher::ChooseDrawn() const {
 }
 
 void Watcher::Draw(const Decided& decided, PageDetail& detail) {
-  const decision_t& decision = decided.decision;
-  if (GetDigest(decision.config_digest) != task_.grounds.config) {
+  const auto& [decision, event, sent, is_of_known_task, basis] = decided.recorded;
+  if (!is_of_known_task) {
     detail.missing = "it was decided under another task file";
     return;
   }
-  const auto candidate = decided.candidate ? Decoded<candidate_plan_t>(*decided.candidate) : std::nullopt;
+  const auto candidate = sent ? Decoded<candidate_plan_t>(sent->bytes) : std::nullopt;
   if (!candidate) {
     detail.missing = "its candidate did not arrive here";
     return;
   }
-  detail.missing = WhyNotJudged(*candidate, task_);
+  const GateOptions& gate = basis.task->gate;
+  detail.missing = WhyNotJudged(*candidate, *basis.task);
   if (!detail.missing.empty()) return;
   try {
-    const JudgedCandidate judged{*candidate, ScheduleOf(*candidate, task_.gate), decision.outcome, decision.step};
+    const JudgedCandidate judged{*candidate, ScheduleOf(*candidate, gate), decision.outcome, decision.step};
     const Plan plan = PlanOf(judged.candidate, judged.schedule);
     const Zonotope initial_set = InitialSetOf(*candidate);
-    certifier_->Require(plan, initial_set, *decided.obstacles);
-    const Decision again = CertifyInPieces(*certifier_, plan, initial_set, *decided.obstacles,
-                                           MostPieces(decision.outcome, task_.gate), *tube_);
-    Describe(*certifier_, judged, again, *tube_, *decided.obstacles, detail);
+    const Certifier& certifier = certifier_.At(basis);
+    certifier.Require(plan, initial_set, *basis.obstacles);
+    const Decision again =
+        CertifyInPieces(certifier, plan, initial_set, *basis.obstacles, MostPieces(decision.outcome, gate), *tube_);
+    Describe(certifier, judged, again, *tube_, *basis.obstacles, detail);
   } catch (const std::invalid_argument& error) {
     detail.missing = std::string("it cannot be judged again: ") + error.what();
   }
@@ -338,9 +288,10 @@ void Watcher::Draw(const Decided& decided, PageDetail& detail) {
 
 // The interval hulls of a certificate, in the plane.
 void Watcher::DrawBoxes(const Decided& decided, PageDetail& detail) const {
-  const auto certified = decided.certificate ? Decoded<certified_plan_t>(*decided.certificate) : std::nullopt;
-  const Eigen::MatrixXd& projection = task_.problem->projection;
-  if (!certified || projection.rows() != 2 || !HasSizes(certified->plan, *task_.problem->model)) return;
+  const certified_plan_t* const certified = decided.certificate.get();
+  const Problem& problem = *task().problem;
+  const Eigen::MatrixXd& projection = problem.projection;
+  if (!certified || projection.rows() != 2 || !HasSizes(certified->plan, *problem.model)) return;
   std::vector<std::vector<Svg::Points>> units;
   const Eigen::Index n = projection.cols();
   for (int t = 0; t <= certified->plan.num_steps; ++t) {
@@ -352,7 +303,7 @@ void Watcher::DrawBoxes(const Decided& decided, PageDetail& detail) const {
   detail.start_utime = certified->plan.start_utime;
   detail.step_us = certified->plan.step_us;
   detail.steps = certified->plan.num_steps;
-  if (DrawTube(units, {}, *decided.obstacles, -1, detail))
+  if (DrawTube(units, {}, *decided.recorded.basis.obstacles, -1, detail))
     detail.missing = "the boxes of its certificate, without the body; " + detail.missing;
 }
 
@@ -367,9 +318,9 @@ Json Watcher::DecisionJson(const Decided& decided, bool is_drawn) {
   if (is_drawn)
     Draw(decided, detail);
   else
-    detail.missing = IsJudged(decided.decision) ? "more was decided at this time than this page draws"
-                                                : "it was answered without a tube";
-  if (decided.decision.outcome == decision_t::CERTIFIED && !detail.missing.empty()) DrawBoxes(decided, detail);
+    detail.missing = IsJudged(decided.recorded.decision) ? "more was decided at this time than this page draws"
+                                                         : "it was answered without a tube";
+  if (decided.recorded.decision.outcome == decision_t::CERTIFIED && !detail.missing.empty()) DrawBoxes(decided, detail);
   if (detail.svg.size() > kBytesOfATube) {
     detail.svg.clear();
     detail.missing = "its drawing is too large for this page";
@@ -396,15 +347,15 @@ void Watcher::Tick(std::int64_t now_us, const LiveLosses& losses) {
 }
 
 Json Watcher::Beginning() const {
-  const NominalModel& model = *task_.problem->model;
-  return {{"task", Printable(task_.path)},
+  const NominalModel& model = *task().problem->model;
+  return {{"task", Printable(task().path)},
           {"model", Printable(model.name())},
-          {"digest", ToHex(task_.grounds.config)},
-          {"url", Printable(task_.bus.url)},
+          {"digest", ToHex(task().grounds.config)},
+          {"url", Printable(task().bus.url)},
           {"robot", keys_ ? Json(keys_->robot()) : Json()},
-          {"holds", HoldsName(*task_.problem)},
+          {"holds", HoldsName(*task().problem)},
           {"states", model.state_names()},
-          {"planar", task_.problem->projection.rows() == 2}};
+          {"planar", task().problem->projection.rows() == 2}};
 }
 
 Json Watcher::RobotJson() const {
@@ -419,9 +370,9 @@ Json Watcher::RobotJson() const {
                      : state.mode == robot_state_t::STANDING ? "standing"
                                                              : "finished"},
             {"state", std::vector<double>(x.begin(), x.end())}};
-  if (task_.problem->projection.rows() != 2 || x.size() != task_.problem->projection.cols()) return json;
-  const Eigen::Vector2d at = task_.problem->projection * x;
-  const std::vector<Svg::Points> body = BodyAt(*task_.problem, x);
+  if (task().problem->projection.rows() != 2 || x.size() != task().problem->projection.cols()) return json;
+  const Eigen::Vector2d at = task().problem->projection * x;
+  const std::vector<Svg::Points> body = BodyAt(*task().problem, x);
   Eigen::AlignedBox2d frame(at);
   for (const Svg::Points& part : body)
     for (const Eigen::Vector2d& corner : part) frame.extend(corner);
@@ -450,7 +401,7 @@ Json Watcher::NowJson(std::int64_t now_us, const LiveLosses& losses) const {
               {"gaps", counts_.gaps},
               {"dropped", losses.dropped},
               {"datagrams_refused", losses.datagrams_refused}}},
-            {"refused", forereach::ToJson(authenticator_.refusals())},
+            {"refused", forereach::ToJson(timeline_.passed_over().not_authentic)},
             {"certifier", Json()},
             {"logger", Json()}};
   if (status_) {

@@ -6,9 +6,9 @@
 **Bounds.** Of each kind of record the last ones are kept, so no sender can make it grow. A few tubes are drawn in each
 tick, those of certificates first; the other decisions are shown without theirs.
 
-**Tubes** are of candidates that this program decides again, as it knows obstacles and observations. Where it decides
-otherwise, as a page that began later than the certifier may, a certified plan is shown by the boxes of its
-certificate. */
+**Tubes** are of candidates that this program decides again, with the obstacles and observations that the timeline
+(records/timeline.h) finds on the bus as it does in a log. Where it decides otherwise, as a page that began later than
+the certifier may, a certified plan is shown by the boxes of its certificate. */
 #pragma once
 
 #include <array>
@@ -25,15 +25,15 @@ certificate. */
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "certifier/gate/obstacles_in_force.h"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_t.hpp"
-#include "forereach/certify/certifier.h"
-#include "forereach/decision_t.hpp"
+#include "forereach/certify/tube.h"
 #include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "page/page_data.h"
 #include "records/interpreter.h"
-#include "records/log_trust.h"
+#include "records/recorded_case.h"
+#include "records/timeline.h"
 #include "records/undecided.h"
 #include "task/config.h"
 
@@ -61,7 +61,7 @@ class LiveFeed final {
   std::deque<std::string> texts_;
 };
 
-class Watcher final {
+class Watcher final : TimelineUser {
  public:
   static constexpr std::int64_t kTickUs = 100'000;  ///< Between two updates of the page.
   static constexpr int kTubesInATick = 3;
@@ -74,7 +74,7 @@ class Watcher final {
   Watcher(Config task, std::optional<KeyRing> keys, ReadAgain read_again);
 
   /** The next message of the bus, as it arrived. One thread at a time calls Take and Tick. */
-  void Take(const LogEvent& event);
+  void Take(const LogEvent& event) { timeline_.Take(event, ""); }
 
   /** Draws what was decided since the last call, and updates the page. */
   void Tick(std::int64_t now_us, const LiveLosses& losses = {});
@@ -93,27 +93,27 @@ class Watcher final {
 
  private:
   struct Decided {
-    decision_t decision;
     DecisionRow row;
-    std::optional<std::vector<std::uint8_t>> candidate, certificate;  // as they were sent
-    std::shared_ptr<const std::vector<Obstacle>> obstacles;
+    RecordedDecision recorded{};
+    std::shared_ptr<const certified_plan_t> certificate{};
   };
   enum Feed { kDecisionFeed, kFaultFeed, kWithdrawalFeed, kEventFeed, kGapFeed, kPlaceFeed };
 
-  void UseTask(Config task);
-  void ShowObstacles();
-  [[nodiscard]] std::string ObstaclesSvg(std::int64_t now_us) const;
+  [[nodiscard]] std::size_t MostLearned() const override { return 200'000; }
+  void OnEvent(const LogEvent& event) override;
+  void OnDecision(const RecordedDecision& recorded) override;
+  void OnCertified(const RecordedPlan& recorded) override;
+  void OnWithdrawn(const RecordedWithdrawal& recorded) override;
+
+  [[nodiscard]] const Config& task() const { return *tasks_.back(); }
+  [[nodiscard]] const Config* Find(const Digest& config);
   void TakeRows(const LogEvent& event);
   [[nodiscard]] bool TakeMessage(const LogEvent& event);
-  [[nodiscard]] bool TakeDecision(const LogEvent& event);
   [[nodiscard]] bool TakeState(const LogEvent& event);
   [[nodiscard]] bool TakeStatus(const LogEvent& event);
-  [[nodiscard]] bool TakeObstacles(const LogEvent& event);
-  [[nodiscard]] bool TakeTransition(const LogEvent& event);
   [[nodiscard]] bool TakeFault(const LogEvent& event);
-  [[nodiscard]] bool TakeWithdrawal(const LogEvent& event);
-  void ReadAgainFor(const Digest& config, std::int64_t now_us);
 
+  [[nodiscard]] std::string ObstaclesSvg(std::int64_t now_us) const;
   [[nodiscard]] std::vector<bool> ChooseDrawn() const;
   [[nodiscard]] nlohmann::json DecisionJson(const Decided& decided, bool is_drawn);
   void Draw(const Decided& decided, PageDetail& detail);
@@ -122,24 +122,22 @@ class Watcher final {
   [[nodiscard]] nlohmann::json RobotJson() const;
   void Add(Feed feed, const nlohmann::json& record);
 
-  Config task_;
+  std::vector<std::shared_ptr<const Config>> tasks_;  // the file as it was read, the last one as it is
   const std::optional<KeyRing> keys_;
   const ReadAgain read_again_;
-  LogAuthenticator authenticator_;
   Interpreter interpreter_;
-  std::unique_ptr<Certifier> certifier_;
-  std::optional<ObstaclesInForce> in_force_;
-  std::shared_ptr<const std::vector<Obstacle>> obstacles_;
-  Digest obstacles_digest_{};
-  Digest tried_{};  // the config digest for which the file was read again last
+  Timeline timeline_;
+  CaseCertifier certifier_;
+  std::int64_t now_us_ = 0;  // of the last message
+  Digest tried_{};           // the config digest for which the file was read again last
   std::int64_t tried_us_ = 0;
   std::string other_task_;  // why tubes may be missing
 
-  Undecided<std::vector<std::uint8_t>> candidates_{64}, certificates_{16};
-  std::vector<Decided> decided_;  // since the last tick
-  std::int64_t skipped_ = 0;      // decisions of one tick that were too many to be shown
-  std::deque<std::pair<std::int64_t, std::int64_t>> faults_, withdrawals_;  // which are repeated
-  std::optional<std::pair<std::int64_t, certifier_status_t>> status_;       // and when it arrived
+  Undecided<std::shared_ptr<const certified_plan_t>> certificates_{16};
+  std::vector<Decided> decided_;                              // since the last tick
+  std::int64_t skipped_ = 0;                                  // decisions of one tick that were too many to be shown
+  std::deque<std::pair<std::int64_t, std::int64_t>> faults_;  // which are repeated
+  std::optional<std::pair<std::int64_t, certifier_status_t>> status_;  // and when it arrived
   std::optional<std::pair<std::int64_t, logger_status_t>> logger_;
   std::optional<std::pair<std::int64_t, robot_state_t>> state_;
   std::unique_ptr<Tube> tube_;
