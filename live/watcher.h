@@ -66,6 +66,7 @@ class Watcher final : TimelineUser {
   static constexpr std::int64_t kTickUs = 100'000;  ///< Between two updates of the page.
   static constexpr int kTubesInATick = 3;
   static constexpr std::size_t kDecisions = 120, kOthers = 60, kPlaces = 600;
+  static constexpr std::size_t kMostTasks = 64;  ///< Of the task file, as it changes.
 
   using ReadAgain = std::function<Config()>;
 

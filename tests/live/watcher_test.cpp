@@ -38,6 +38,7 @@ TEST(WatcherTest, SendsEveryDecisionOfTheRecordedCourse) {
   for (const json& decision : reader.decisions) {
     const json& detail = decision.at("detail");
     if (detail.at("svg") == "") continue;
+    EXPECT_EQ(detail.at("missing"), "") << "the page knew what the certifier knew";
     EXPECT_GT(detail.at("units"), 0);
     EXPECT_THAT(detail.at("svg").get<std::string>(), HasSubstr("<circle"));
     if (decision.at("step") >= 0) EXPECT_EQ(detail.at("binding"), decision.at("step"));
@@ -119,6 +120,32 @@ TEST(WatcherTest, ReadsAnotherTaskFileAgainOrSaysThatItDiffers) {
   Play(CourseEvents(), lost, &told);
   EXPECT_EQ(CountDrawn(told.decisions, "certified"), 0);
   EXPECT_THAT(told.now.at("note").get<std::string>(), HasSubstr("it is gone"));
+}
+
+TEST(WatcherTest, FollowsTheTaskFileThroughSoManyReloads) {
+  const std::vector<LogEvent> events = CourseEvents();
+  LogEvent event = *std::ranges::find(events, "PLAN_DECISION", &LogEvent::channel);
+  decision_t decision = *Decoded<decision_t>(event.message());
+  Config task = CourseTask();
+  const auto change = [&](std::size_t version) {
+    task.grounds.config = DigestOf("version " + std::to_string(version));
+  };
+  change(0);
+  Watcher watcher(task, {}, [&] { return task; });
+  Reader reader;
+  for (std::size_t version = 1; version <= Watcher::kMostTasks; ++version) {
+    change(version);
+    SetDigest(decision.config_digest, task.grounds.config);
+    const auto bytes = Encode(decision);
+    event.data.assign(bytes.begin(), bytes.end());
+    event.utime += 3'000'000;
+    watcher.Take(event);
+    watcher.Tick(event.utime);
+    reader.Read(watcher);
+    const std::string note = reader.now.at("note");
+    EXPECT_EQ(note.empty(), version < Watcher::kMostTasks) << note;
+  }
+  EXPECT_THAT(reader.now.at("note").get<std::string>(), HasSubstr("start this program again"));
 }
 
 // ---- Trust.
