@@ -607,10 +607,12 @@ class SafetyTest::Judgement {
     }
   }
 
+  // Without initializers: a list of many costs nothing until they are found.
   struct Near {
     int t, o;
-    double gap;                       // a lower bound on the distance, about
-    std::array<double, 2> towards{};  // a direction that shows it; zero: none
+    double gap;                     // a lower bound on the distance, about; no NaN
+    std::array<double, 2> towards;  // a direction that shows it; zero: none
+    bool is_refined;
   };
 
   // All pairs that may touch or be the closest, those that may touch in the order of time. If there are too many, fewer
@@ -623,9 +625,13 @@ class SafetyTest::Judgement {
         index, from, to, [&] { return farthest(); },
         [&](int t, int o) {
           if (!has_room) return;
-          Near pair{t, o, Gap(t, o)};
+          const Obstacle& other = obstacle(o);
+          Near pair{t, o, Gap(t, other), {}, false};
           if (pair.gap > WithTolerance(index, farthest())) return;
-          if (pair.gap < farthest_ / 2) farthest_ = std::min(farthest_, DistanceUpper(t, o));
+          if (pair.gap < std::max(nearest_gap_, farthest_ / 16)) {
+            nearest_gap_ = std::min(nearest_gap_, pair.gap);
+            farthest_ = std::min(farthest_, DistanceUpper(t, other));
+          }
           if (count < near.size())
             near[count++] = pair;
           else if (to - from > 1)
@@ -638,21 +644,33 @@ class SafetyTest::Judgement {
       SeeNear(index, from, middle);
       return touched_ == units_ ? SeeNear(index, middle, to) : void();
     }
-    const double farthest_of_all = WithTolerance(index, farthest());
-    auto found = std::span(near).first(count);
-    found = found.first(
-        ToSize(std::remove_if(found.begin(), found.end(), [&](const Near& a) { return a.gap > farthest_of_all; }) -
-               found.begin()));
-    std::ranges::sort(found, [](const Near& a, const Near& b) { return std::tie(a.t, a.o) < std::tie(b.t, b.o); });
-    for (Near& pair : found) {
-      if (IsAfterTouch(pair.t, pair.o)) return;
-      Refine(pair, WithTolerance(index, farthest()));
-      if (pair.gap <= WithTolerance(index, 0)) SettleNear(index, pair);
+    const auto found = std::span(near).first(count);
+    const auto others =
+        std::partition(found.begin(), found.end(), [&](const Near& a) { return !(a.gap > WithTolerance(index, 0)); });
+    std::sort(found.begin(), others,
+              [](const Near& a, const Near& b) { return std::tie(a.t, a.o) < std::tie(b.t, b.o); });
+    for (auto pair = found.begin(); pair != others; ++pair) {
+      if (IsAfterTouch(pair->t, pair->o)) return;
+      Refine(*pair, WithTolerance(index, farthest()));
+      SettleNear(index, *pair);
     }
     if (touched_ < units_) return;
-    // The nearest first: they leave few of the others.
-    std::ranges::sort(found, {}, &Near::gap);
-    for (const Near& pair : found) ConsiderNear(index, pair);
+    // The nearest first: they leave few of the others, most of them not even refined.
+    const auto is_further = [](const Near& a, const Near& b) { return a.gap > b.gap; };
+    std::ranges::make_heap(found, is_further);
+    for (auto end = found.end(); end != found.begin();) {
+      const double far = WithTolerance(index, farthest());
+      if (found.front().gap > far) return;
+      std::pop_heap(found.begin(), end, is_further);
+      Near& nearest = *std::prev(end);
+      if (nearest.is_refined) {
+        ConsiderNear(index, nearest);
+        --end;
+      } else {
+        Refine(nearest, far);
+        std::push_heap(found.begin(), end, is_further);
+      }
+    }
   }
 
   // What is further is not the closest. Where places of the body are not known before they are enclosed, not yet.
@@ -686,41 +704,42 @@ class SafetyTest::Judgement {
   }
 
   // Between the box around the body, or around its places widened by its reach, and that around the obstacle.
-  [[nodiscard]] double Gap(int t, int o) const noexcept {
+  [[nodiscard]] double Gap(int t, const Obstacle& other) const noexcept {
     const Hull& hull = (has_boxes() ? bodies_ : hulls_)[ToSize(t - first_)];
     double square = 0;
     for (int k = 0; k < test_.placement_.dim(); ++k) {
       const double center = hull.center[ToSize(k)];
-      const double gap =
-          std::max(obstacle(o).lower()[k] - center, center - obstacle(o).upper()[k]) - hull.half_width[ToSize(k)];
+      const double gap = std::max(other.lower()[k] - center, center - other.upper()[k]) - hull.half_width[ToSize(k)];
       if (gap > 0) square += gap * gap;
     }
-    return std::sqrt(square) - obstacle(o).radius() - (has_boxes() ? 0 : test_.placement_.reach());
+    const double gap = std::sqrt(square) - other.radius() - (has_boxes() ? 0 : test_.placement_.reach());
+    return gap > -kInfinity ? gap : -kInfinity;
   }
 
   // The distance of some point of the body in the middle of a slice from some point of the obstacle, from above.
-  [[nodiscard]] double DistanceUpper(int t, int o) const noexcept {
+  [[nodiscard]] double DistanceUpper(int t, const Obstacle& other) const noexcept {
     const Placement& placement = test_.placement_;
+    const bool is_box = other.kind() == Obstacle::Kind::kBox;
     const auto distance = [&](const std::array<double, kMaxSafetyDim>& y) {
-      const bool is_box = obstacle(o).kind() == Obstacle::Kind::kBox;
       double square = 0;
       for (int k = 0; k < placement.dim(); ++k) {
-        const double a = y[ToSize(k)], &lower = obstacle(o).lower()[k], &upper = obstacle(o).upper()[k];
-        const double away = is_box ? std::max({lower - a, a - upper, 0.0}) : obstacle(o).hull().front()[k] - a;
+        const double a = y[ToSize(k)], lower = other.lower()[k], upper = other.upper()[k];
+        const double away = is_box ? std::max({lower - a, a - upper, 0.0}) : other.hull().front()[k] - a;
         square += away * away;
       }
       return std::sqrt(square);
     };
-    const Eigen::Vector3d center = (obstacle(o).lower() + obstacle(o).upper()) / 2;
+    const Placement::Pose& pose = poses_[ToSize(t - first_)];
+    const Eigen::Vector3d center = (other.lower() + other.upper()) / 2;
     double least = kInfinity;
     if (!has_boxes()) {
-      if (is_at_frame()) least = distance(poses_[ToSize(t - first_)].frame.center) - placement.parts().front().radius;
+      if (is_at_frame()) least = distance(pose.frame.center) - placement.parts().front().radius;
     } else {
       for (const Placement::Part& part : placement.parts()) {
         const int last = part.first + part.count - 1;
-        auto from = placement.Middle(poses_[ToSize(t - first_)], last);
+        auto from = placement.Middle(pose, last);
         for (int i = part.first; i <= last; ++i) {  // the point of a side next to the obstacle's middle
-          const auto to = placement.Middle(poses_[ToSize(t - first_)], i);
+          const auto to = placement.Middle(pose, i);
           double along = 0, square = 0;
           for (std::size_t k = 0; k < to.size(); ++k) {
             along += (center[static_cast<Eigen::Index>(k)] - from[k]) * (to[k] - from[k]);
@@ -734,12 +753,12 @@ class SafetyTest::Judgement {
       }
     }
     constexpr double kRounding = 1e-12;
-    return least - obstacle(o).radius() + kRounding * (tree_.size() + std::abs(least) + placement.reach());
+    return least - other.radius() + kRounding * (tree_.size() + std::abs(least) + placement.reach());
   }
 
   // As Settle, of a pair that may touch. What is proven here may be the closest.
   void SettleNear(const ObstacleIndex& index, const Near& pair) noexcept {
-    const auto& [t, o, gap, towards] = pair;
+    const auto& [t, o, gap, towards, is_refined] = pair;
     if (gap > WithTolerance(index, 0) || IsAfterTouch(t, o)) return;
     const Separation by_hulls = ByHulls(t, o);
     if (by_hulls.IsProven()) return;
@@ -822,7 +841,7 @@ class SafetyTest::Judgement {
   }
   // Of what stands, with an index: in the order of their cost.
   void ConsiderNear(const ObstacleIndex& index, const Near& pair) noexcept {
-    const auto& [t, o, gap, towards] = pair;
+    const auto& [t, o, gap, towards, is_refined] = pair;
     const double far = WithTolerance(index, std::min(closest_.clearance, farthest_));
     if (gap > far) return;
     const Separation by_hulls = ByHulls(t, o);
@@ -852,19 +871,20 @@ class SafetyTest::Judgement {
     std::array<std::array<double, 2>, 2> width;  // of the frame, at each sample
   };
 
-  void SketchBody(int t) noexcept {
-    if (std::exchange(outline_.t, t) == t) return;
+  const Outline& SketchBody(int t) noexcept {
+    Outline& outline = outlines_[ToSize(t) % outlines_.size()];
+    if (std::exchange(outline.t, t) == t) return outline;
     const Placement& placement = test_.placement_;
     for (std::size_t s = 0; s <= ToSize(span()); ++s) {
       const Placement::Pose& pose = poses_[ToSize(t - first_) + s];
-      outline_.width[s] = {pose.frame.half_width[0], pose.frame.half_width[1]};
+      outline.width[s] = {pose.frame.half_width[0], pose.frame.half_width[1]};
       for (const Placement::Part& part : placement.parts())
         for (int i = part.first; i < part.first + part.count; ++i) {
           const std::size_t j = s * kMaxBodyPoints + ToSize(i);
           const auto middle = placement.Middle(pose, i);
-          outline_.x[j] = middle[0];
-          outline_.y[j] = middle[1];
-          outline_.around[j] = placement.Around(pose, i) + part.radius;
+          outline.x[j] = middle[0];
+          outline.y[j] = middle[1];
+          outline.around[j] = placement.Around(pose, i) + part.radius;
         }
     }
     for (std::size_t s = 0; s <= ToSize(span()); ++s)
@@ -872,23 +892,25 @@ class SafetyTest::Judgement {
         const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
         for (std::size_t j = first; j < end && part.count > 1; ++j) {
           const std::size_t next = j + 1 < end ? j + 1 : first;
-          const double across_x = outline_.y[next] - outline_.y[j], across_y = outline_.x[j] - outline_.x[next];
+          const double across_x = outline.y[next] - outline.y[j], across_y = outline.x[j] - outline.x[next];
           const double length = std::sqrt(across_x * across_x + across_y * across_y);
           const double scale = length > 0x1p-300 ? 1 / length : 0;
-          outline_.side_x[j] = scale * across_x;
-          outline_.side_y[j] = scale * across_y;
-          outline_.side_end[j] = FarthestOf(part, outline_.side_x[j], outline_.side_y[j]);
+          outline.side_x[j] = scale * across_x;
+          outline.side_y[j] = scale * across_y;
+          outline.side_end[j] = FarthestOf(outline, part, outline.side_x[j], outline.side_y[j]);
         }
       }
+    return outline;
   }
   // Of all of a part along a vector of length 1, or 0.
-  [[nodiscard]] double FarthestOf(const Placement::Part& part, double x, double y) const noexcept {
+  [[nodiscard]] double FarthestOf(const Outline& outline, const Placement::Part& part, double x,
+                                  double y) const noexcept {
     double farthest = -kInfinity;
     for (std::size_t s = 0; s <= ToSize(span()); ++s) {
-      const double width = std::abs(x) * outline_.width[s][0] + std::abs(y) * outline_.width[s][1];
+      const double width = std::abs(x) * outline.width[s][0] + std::abs(y) * outline.width[s][1];
       const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
       for (std::size_t j = first; j < end; ++j)
-        farthest = Larger(farthest, x * outline_.x[j] + y * outline_.y[j] + outline_.around[j] + width);
+        farthest = Larger(farthest, x * outline.x[j] + y * outline.y[j] + outline.around[j] + width);
     }
     return farthest;
   }
@@ -896,13 +918,15 @@ class SafetyTest::Judgement {
   // Raises the pair's gap to a lower bound on the distance from the body, up to rounding: by its outline, in the plane.
   // What is above `far` need not be raised further.
   void Refine(Near& pair, double far) noexcept {
+    pair.is_refined = true;
     if (!has_boxes() || test_.placement_.dim() != 2) return;
-    SketchBody(pair.t);
+    const Outline& outline = SketchBody(pair.t);
     const Obstacle& other = obstacle(pair.o);
     Along least;
     least.gap = kInfinity;
     for (const Placement::Part& part : test_.placement_.parts())
-      if (const Along along = GapAround(other, part, far + other.radius()); along.gap < least.gap) least = along;
+      if (const Along along = GapAround(outline, other, part, far + other.radius()); along.gap < least.gap)
+        least = along;
     pair.gap = std::max(pair.gap, least.gap - other.radius());
     pair.towards = least.towards;
   }
@@ -912,17 +936,18 @@ class SafetyTest::Judgement {
     std::array<double, 2> towards{};
   };
   // Across the sides of the body, and from the nearest point to the box around the core.
-  [[nodiscard]] Along GapAround(const Obstacle& other, const Placement::Part& part, double far) const noexcept {
+  [[nodiscard]] Along GapAround(const Outline& outline, const Obstacle& other, const Placement::Part& part,
+                                double far) const noexcept {
     const Eigen::Vector3d &lower = other.lower(), &upper = other.upper();
-    const auto &x = outline_.x, &y = outline_.y;
+    const auto &x = outline.x, &y = outline.y;
     Along best;
     double nearest = kInfinity, towards_x = 0, towards_y = 0;
     for (std::size_t s = 0; s <= ToSize(span()); ++s) {
       const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
       for (std::size_t j = first; j < end && part.count > 1; ++j)
-        if (const double gap = LowestOf(other, outline_.side_x[j], outline_.side_y[j]) - outline_.side_end[j];
+        if (const double gap = LowestOf(other, outline.side_x[j], outline.side_y[j]) - outline.side_end[j];
             gap > best.gap && gap < kInfinity)
-          best = {gap, {outline_.side_x[j], outline_.side_y[j]}};
+          best = {gap, {outline.side_x[j], outline.side_y[j]}};
       for (std::size_t j = first; j < end; ++j) {
         const double to_x = std::max(lower[0] - x[j], 0.0) + std::min(upper[0] - x[j], 0.0),
                      to_y = std::max(lower[1] - y[j], 0.0) + std::min(upper[1] - y[j], 0.0);
@@ -936,7 +961,7 @@ class SafetyTest::Judgement {
     }
     if (!(nearest > 0x1p-600)) return best;
     const double scale = 1 / std::sqrt(nearest), to_x = scale * towards_x, to_y = scale * towards_y;
-    if (const double gap = LowestOf(other, to_x, to_y) - FarthestOf(part, to_x, to_y);
+    if (const double gap = LowestOf(other, to_x, to_y) - FarthestOf(outline, part, to_x, to_y);
         gap > best.gap && gap < kInfinity)
       best = {gap, {to_x, to_y}};
     return best;
@@ -993,7 +1018,7 @@ class SafetyTest::Judgement {
       ForEachNear(
           *index, first_, units_, [&] { return closest_.clearance; },
           [&](int t, int o) {
-            Near pair{t, o, 0};
+            const Near pair{t, o, 0, {}, true};
             ConsiderNear(*index, pair);
           });
   }
@@ -1045,8 +1070,9 @@ class SafetyTest::Judgement {
   // Without, of each core in each unit.
   std::array<double, 4096> bounds_;
   StandingCores cores_;
-  Outline outline_;
-  double farthest_ = kInfinity;  // of the closest pair
+  std::array<Outline, 16> outlines_;  // of the units that were last looked at, by their remainders
+  double farthest_ = kInfinity;       // of the closest pair, from above
+  double nearest_gap_ = kInfinity;    // the least of those that farthest_ was found from
   HullTree tree_;
 };
 

@@ -75,27 +75,31 @@ class Halves final {
     const auto entry = [&](std::int32_t t, std::int32_t i) {
       return Entry{t, i, square_of(hulls.node(t), nodes_[ToSize(i)])};
     };
-    std::array<Entry, 2 * kMostLevels> stack;
+    std::array<Entry, kMostLevels> stack;
     std::size_t count = 0;
-    const auto push = [&](Entry first, Entry second) {
-      if (second.square < first.square) std::swap(first, second);
-      stack[count++] = second;
-      stack[count++] = first;
-    };
-    stack[count++] = entry(0, 0);
-    while (count > 0) {
-      const auto [t, i, square] = stack[--count];
-      const double most = far();
-      if (square < 0 || square > most * most) continue;
-      const HullTree::Node& some = hulls.node(t);
-      const Node& node = nodes_[ToSize(i)];
-      const bool is_unit = some.count == 1, is_leaf = node.count > 0;
-      if (is_unit && is_leaf)
+    double most = far(), most_square = most * most;  // only a visit lowers them
+    const auto is_near = [&](const Entry& some) { return !(some.square < 0 || some.square > most_square); };
+    Entry at = entry(0, 0);
+    while (true) {
+      if (is_near(at)) {
+        const auto [t, i, square] = at;
+        const HullTree::Node& some = hulls.node(t);
+        const Node& node = nodes_[ToSize(i)];
+        const bool is_unit = some.count == 1, is_leaf = node.count > 0;
+        if (!is_unit || !is_leaf) {
+          const bool cuts_hulls = is_leaf || (!is_unit && Extent(some) >= Extent(node));
+          at = cuts_hulls ? entry(t + 1, i) : entry(t, i + 1);
+          Entry other = cuts_hulls ? entry(some.second, i) : entry(t, node.first);
+          if (other.square < at.square) std::swap(at, other);
+          if (is_near(other)) stack[count++] = other;
+          continue;
+        }
         for (int place = node.first; place < node.first + node.count; ++place) visit(some.first, order_[ToSize(place)]);
-      else if (is_leaf || (!is_unit && Extent(some) >= Extent(node)))
-        push(entry(t + 1, i), entry(some.second, i));
-      else
-        push(entry(t, i + 1), entry(t, node.first));
+        most = far();
+        most_square = most * most;
+      }
+      if (count == 0) return;
+      at = stack[--count];
     }
   }
 
@@ -143,12 +147,16 @@ class Halves final {
 };
 
 /** How far two boxes are from each other, squared. What is not a number is no distance, nor is what is too small or too
-large for its square. */
-[[nodiscard]] FOREREACH_INLINE double SquareOfDistance(const HullTree::Node& a, const Lanes& lower,
-                                                       const Lanes& upper) noexcept {
-  const Lanes below = lower - LoadLanes(a.upper.data()), above = LoadLanes(a.lower.data()) - upper;
-  const Lanes gap = Max(Max(below, above), AllLanes(0));
-  const double square = Sum(gap * gap);
+large for its square. @param lower, upper have kMaxSafetyDim ends of the other one. */
+template <class Ends>
+[[nodiscard]] FOREREACH_INLINE double SquareOfDistance(const HullTree::Node& a, const Ends& lower,
+                                                       const Ends& upper) noexcept {
+  double square = 0;
+  for (std::size_t k = 0; k < kMaxSafetyDim; ++k) {
+    const double below = lower[k] - a.upper[k], above = a.lower[k] - upper[k];
+    const double larger = below > above ? below : above, gap = larger > 0 ? larger : 0;  // NaN: 0
+    square += gap * gap;
+  }
   return square > 0x1p-800 && square < kInfinity ? square : 0;
 }
 
@@ -169,9 +177,7 @@ class BoxTree final {
   void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit) const {
     halves_.Search(
         hulls,
-        [](const HullTree::Node& some, const Node& node) {
-          return SquareOfDistance(some, LoadLanes(node.lower.data()), LoadLanes(node.upper.data()));
-        },
+        [](const HullTree::Node& some, const Node& node) { return SquareOfDistance(some, node.lower, node.upper); },
         FarBy(kHair * (size_ + hulls.size() + reach), reach, within), visit);
   }
   /** How far nodes have to be from each other to be left out. */

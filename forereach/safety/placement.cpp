@@ -267,11 +267,13 @@ void Placement::Observe(const Zonotope& slice, std::span<const double> half_widt
     expressions_->Enclose(slice.center(), half_width, {kNoInput.data(), ToSize(num_inputs_)},
                           {sample.linear.data(), ToSize(expressions_->num_values())});
   }
-  for (std::size_t i = 0; i < points_.size(); ++i)
+  for (std::size_t i = 0; i < points_.size(); ++i) {
     if (points_[i].linear < 0)
       OverSlice(points_[i], rotation, sample.points[i]);
     else
       OverSlice(sample, i);
+    for (std::size_t k = 0; k < ToSize(dim()); ++k) sample.points[i].slack[k] = Slack(sample, i, k);
+  }
 }
 
 unsigned Placement::SeparableStates() const {
@@ -317,7 +319,7 @@ double Placement::SupportAtExpressions(const Sample& sample, int i, const Eigen:
   for (std::size_t k = 0; k < ToSize(dim()); ++k) {
     const double along = d[static_cast<Eigen::Index>(k)], magnitude = std::abs(along);
     for (std::size_t l = 0; l < ToSize(slice.dim()); ++l) weight[l] += along * sample.linear[first + k].slope[l];
-    support += along * point.offset[k] + magnitude * (Slack(sample, ToSize(i), k) + point.spread[k]);
+    support += along * point.offset[k] + magnitude * (point.slack[k] + point.spread[k]);
     size += magnitude * point.size;
   }
   Lanes spread = AllLanes(0);
@@ -345,7 +347,7 @@ void Placement::EncloseAtExpressions(const Sample& sample, std::size_t i, Zonoto
     ArraysOf(place).mutable_slack(k) = 0;
   }
   for (int k = 0; k < dim(); ++k)
-    ArraysOf(place).AppendAxis(k, AddUp(sample.points[i].spread[ToSize(k)], Slack(sample, i, ToSize(k))));
+    ArraysOf(place).AppendAxis(k, AddUp(sample.points[i].spread[ToSize(k)], sample.points[i].slack[ToSize(k)]));
 }
 
 namespace {
@@ -398,7 +400,7 @@ double Placement::SupportInline(const Sample& sample, const Part& part, const Ei
     for (std::size_t k = 0; k < ToSize(dim()); ++k) {
       const double along = d[static_cast<Eigen::Index>(k)], magnitude = std::abs(along);
       turned += along * point.slope[k];
-      support += along * middle(sample, i, k) + magnitude * (Slack(sample, ToSize(i), k) + point.spread[k]);
+      support += along * middle(sample, i, k) + magnitude * (point.slack[k] + point.spread[k]);
       size += magnitude * (sample.size[k] + point.size);
     }
     if (heading_ >= 0) terms[count - 1].weight = turned;
@@ -439,7 +441,7 @@ void Placement::EncloseInline(const Sample& sample, Zonotope* places) const noex
       ArraysOf(place).mutable_slack(k) = 0;
     }
     for (int k = 0; k < dim(); ++k)
-      ArraysOf(place).AppendAxis(k, AddUp(point.spread[ToSize(k)], Slack(sample, i, ToSize(k))));
+      ArraysOf(place).AppendAxis(k, AddUp(point.spread[ToSize(k)], point.slack[ToSize(k)]));
   }
 }
 

@@ -85,8 +85,8 @@ class Placement final {
   struct Sample {
     struct Point {
       // g_i(x) - P x, as offset + slope (x_heading - c_heading) +- spread. At expressions: g_i(x), as offset + slope of
-      // `linear` . (x - c) +- spread, and `slope` is zero
-      std::array<double, kMaxSafetyDim> offset, spread, slope;
+      // `linear` . (x - c) +- spread, and `slope` is zero. `slack`: what rounding may add to spread
+      std::array<double, kMaxSafetyDim> offset, spread, slope, slack;
       double size;  // of what these are computed from
     };
 

@@ -151,16 +151,21 @@ class DirectionSearch {
     double spread;  // d . offset
   };
   [[nodiscard]] FOREREACH_INLINE static Reach Farthest(const Zonotope& set, const Vector& d) noexcept {
+    return set.dim() == 2 ? FarthestIn<2>(set, d) : set.dim() == 3 ? FarthestIn<3>(set, d) : FarthestIn<1>(set, d);
+  }
+  // The dimension is known, so the loops over it are unrolled.
+  template <std::size_t kDim>
+  [[nodiscard]] FOREREACH_INLINE static Reach FarthestIn(const Zonotope& set, const Vector& d) noexcept {
     std::array<Lanes, kMaxSafetyDim> far{};
+    std::array<const double*, kDim> rows;
+    for (std::size_t k = 0; k < kDim; ++k) rows[k] = set.padded_row(static_cast<int>(k)).data();
     Lanes spread = AllLanes(0);
-    const auto p = ToSize(set.dim());
-    for (std::size_t j = 0; j < set.padded_size(); j += kLaneCount) {
-      Lanes along = AllLanes(d[0]) * LoadLanes(set.padded_row(0).data() + j);
-      for (std::size_t k = 1; k < p; ++k)
-        along = along +
-                AllLanes(d[static_cast<Eigen::Index>(k)]) * LoadLanes(set.padded_row(static_cast<int>(k)).data() + j);
-      for (std::size_t k = 0; k < p; ++k) {
-        const Lanes g = LoadLanes(set.padded_row(static_cast<int>(k)).data() + j);
+    for (std::size_t j = 0, size = set.padded_size(); j < size; j += kLaneCount) {
+      Lanes along = AllLanes(d[0]) * LoadLanes(rows[0] + j);
+      for (std::size_t k = 1; k < kDim; ++k)
+        along = along + AllLanes(d[static_cast<Eigen::Index>(k)]) * LoadLanes(rows[k] + j);
+      for (std::size_t k = 0; k < kDim; ++k) {
+        const Lanes g = LoadLanes(rows[k] + j);
         far[k] += along < AllLanes(0) ? -g : g;
       }
       spread += Abs(along);
