@@ -1,5 +1,5 @@
 /** Reads a recorded run in the order in which the certifier acted. Replay, verify, report and summary read logs only
-through this class.
+through this class, and the live page reads the bus through it.
 
 The timeline follows the certifier through event logs: starts of its process, reloads, and the obstacles and learned
 transitions of each decision. It pairs each candidate with its decision and its certified plan.
