@@ -90,6 +90,7 @@ Watcher::Watcher(Config task, std::optional<KeyRing> keys, ReadAgain read_again)
       interpreter_(this->task().bus, ""),
       timeline_(
           this->task(), [this](const Digest& config) { return Find(config); }, keys_, {this}, kBounds),
+      obstacles_(kBounds.obstacles),
       tube_(std::make_unique<Tube>()) {}
 
 // The certifier may run another task than this: the file may have been reloaded.
@@ -129,10 +130,7 @@ void Watcher::TakeRows(const LogEvent& event) {
     ++counts_.decisions;
     ++counts_.by_outcome[row.outcome];
     if (row.cause != CauseName(decision_t::CAUSE_NONE)) ++counts_.by_cause[row.cause];
-    if (decided_.size() == kInATick) {
-      decided_.erase(decided_.begin());
-      ++skipped_;
-    }
+    if (decided_.size() == kInATick) SkipFirst();
     decided_.push_back({std::move(row)});
   }
   for (const EventRow& row : rows.events)
@@ -166,10 +164,18 @@ bool Watcher::TakeMessage(const LogEvent& event) {
   return event.channel == channels.command || interpreter_.Identify(event.channel, event.message()).second;
 }
 
+void Watcher::SkipFirst() {
+  if (const auto& obstacles = decided_.front().recorded.basis.obstacles) obstacles_.Remove(*obstacles);
+  decided_.erase(decided_.begin());
+  ++skipped_;
+}
+
 void Watcher::OnDecision(const RecordedDecision& recorded) {
   Decided& decided = decided_.back();  // its row was made just now
   decided.recorded = recorded;
   decided.certificate = certificates_.Take(GetDigest(recorded.decision.plan_digest)).value_or(nullptr);
+  obstacles_.Add(*recorded.basis.obstacles);
+  while (obstacles_.AreTooMany() && decided_.size() > 1) SkipFirst();
 }
 
 void Watcher::OnCertified(const RecordedPlan& recorded) {
@@ -290,7 +296,7 @@ void Watcher::Draw(const Decided& decided, PageDetail& detail) {
 // The interval hulls of a certificate, in the plane.
 void Watcher::DrawBoxes(const Decided& decided, PageDetail& detail) const {
   const certified_plan_t* const certified = decided.certificate.get();
-  const Problem& problem = *task().problem;
+  const Problem& problem = *decided.recorded.basis.task->problem;
   const Eigen::MatrixXd& projection = problem.projection;
   if (!certified || projection.rows() != 2 || !HasSizes(certified->plan, *problem.model)) return;
   std::vector<std::vector<Svg::Points>> units;
@@ -338,6 +344,7 @@ void Watcher::Tick(std::int64_t now_us, const LiveLosses& losses) {
   const std::vector<bool> drawn = ChooseDrawn();
   for (std::size_t i = 0; i < decided_.size(); ++i) Add(kDecisionFeed, DecisionJson(decided_[i], drawn[i]));
   decided_.clear();
+  obstacles_ = KeptObstacles(kBounds.obstacles);
   std::string now = JsonText(NowJson(now_us, losses)), obstacles = JsonText(Json(ObstaclesSvg(now_us)));
   const std::lock_guard lock(mutex_);
   now_ = std::move(now);

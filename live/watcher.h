@@ -109,6 +109,7 @@ class Watcher final : TimelineUser {
   [[nodiscard]] const Config& task() const { return *tasks_.back(); }
   [[nodiscard]] const Config* Find(const Digest& config);
   void TakeRows(const LogEvent& event);
+  void SkipFirst();
   [[nodiscard]] bool TakeMessage(const LogEvent& event);
   [[nodiscard]] bool TakeState(const LogEvent& event);
   [[nodiscard]] bool TakeStatus(const LogEvent& event);
@@ -136,6 +137,7 @@ class Watcher final : TimelineUser {
 
   Undecided<std::shared_ptr<const certified_plan_t>> certificates_{16};
   std::vector<Decided> decided_;                              // since the last tick
+  KeptObstacles obstacles_;                                   // of these
   std::int64_t skipped_ = 0;                                  // decisions of one tick that were too many to be shown
   std::deque<std::pair<std::int64_t, std::int64_t>> faults_;  // which are repeated
   std::optional<std::pair<std::int64_t, certifier_status_t>> status_;  // and when it arrived

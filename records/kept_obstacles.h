@@ -11,7 +11,8 @@
 namespace forereach {
 
 /** Sets of obstacles, each counted once wherever it is shared, and so the blocks of each grid. A block takes about half
-a kilobyte. Whoever keeps sets in a queue drops the first ones while there are too many, but never the last one. */
+a kilobyte. Whoever keeps sets in a queue drops the first ones while there are too many, but never the last one; what
+that one has does not count, since grids of a task, in all its sets, would leave no room for another. */
 class KeptObstacles final {
  public:
   static constexpr std::size_t kMost = 1 << 18;
@@ -20,12 +21,17 @@ class KeptObstacles final {
   explicit KeptObstacles(std::size_t most) : most_(most) {}
 
   /** @param set stays where it is until it is removed. */
-  void Add(std::span<const Obstacle> set) { Count(set, true); }
+  void Add(std::span<const Obstacle> set) {
+    Count(set, true);
+    newest_ = set.size();
+    for (const Obstacle& obstacle : set)
+      if (obstacle.grid()) newest_ += obstacle.convex().size();
+  }
   /** @pre it was added, and is still there. */
   void Remove(std::span<const Obstacle> set) { Count(set, false); }
 
   [[nodiscard]] std::size_t size() const { return size_; }
-  [[nodiscard]] bool AreTooMany() const { return size_ > most_; }
+  [[nodiscard]] bool AreTooMany() const { return size_ > most_ + newest_; }
 
  private:
   void Count(std::span<const Obstacle> set, bool is_added) {
@@ -43,7 +49,7 @@ class KeptObstacles final {
     return true;
   }
 
-  std::size_t most_ = kMost, size_ = 0;
+  std::size_t most_ = kMost, size_ = 0, newest_ = 0;
   std::map<const void*, std::size_t> uses_;  // of sets and of grids
 };
 

@@ -59,12 +59,12 @@ struct JudgedCandidate {
 class CaseCertifier final {
  public:
   const Certifier& At(const Basis& basis) {
-    if (!certifier_ || task_ != basis.task || learned_ != basis.learned || known_ > basis.num_learned) {
+    if (!certifier_ || task_ != basis.task || (learned_ != basis.learned && known_ > 0) || known_ > basis.num_learned) {
       certifier_ = std::make_unique<Certifier>(basis.task->problem);
       task_ = basis.task;
-      learned_ = basis.learned;
       known_ = 0;
     }
+    learned_ = basis.learned;
     for (; known_ < basis.num_learned; ++known_) {
       const LearnedTransitions::Each transition = (*learned_)[known_];
       static_cast<void>(certifier_->Learn(transition.z, transition.next, transition.longer));

@@ -98,10 +98,10 @@ void ShadowTally::OnDecision(const RecordedDecision& recorded) {
   if (const auto known = plans_.find(decision.plan_id); known != plans_.end()) {
     obstacles_.Remove(*known->second.recorded.basis.obstacles);
     known->second = Plan{CaseOf(recorded), is_certified};
-    return;
+  } else {
+    plans_.emplace(decision.plan_id, Plan{CaseOf(recorded), is_certified});
+    order_.push_back(decision.plan_id);
   }
-  plans_.emplace(decision.plan_id, Plan{CaseOf(recorded), is_certified});
-  order_.push_back(decision.plan_id);
   while (order_.size() > kMostPlans || (obstacles_.AreTooMany() && order_.size() > 1)) {
     if (order_.front() == driven_) EndPlan();
     const auto first = plans_.find(order_.front());

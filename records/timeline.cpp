@@ -166,6 +166,14 @@ void Timeline::Follow(ObstaclesInForce obstacles) {
   obstacles_digest_ = logged_obstacles_.digest();
   obstacles_ = all_logged_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
   logged_observations_ = observations_digest_ = now_->grounds.observations;
+  // Of what was learned before, one list stays: a certified plan may come late after its decision.
+  std::erase_if(decided_order_, [this](const Digest& plan) {
+    const auto decided = decided_.find(plan);
+    if (decided->second.basis.learned == learned_) return false;
+    decided_obstacles_.Remove(*decided->second.basis.obstacles);
+    decided_.erase(decided);
+    return true;
+  });
   learned_ = std::make_shared<LearnedTransitions>();
 }
 

@@ -267,7 +267,7 @@ TEST_F(TimelineTest, TheSetsOfTheLastDecisionsAreKeptAsFarAsThereIsRoom) {
   }
   Append(config_.bus.certified, first_certified_);
   const std::size_t each = config_.obstacles.size() + 1;
-  for (const auto& [room, kept] : {std::pair{5 * each, 5}, {5 * each - 1, 4}, {100 * each, 12}, {std::size_t{0}, 1}}) {
+  for (const auto& [room, kept] : {std::pair{5 * each, 6}, {5 * each - 1, 5}, {100 * each, 12}, {std::size_t{0}, 1}}) {
     Keeper keeper;
     keeper.Read(config_, logs_, {.obstacles = room});
     EXPECT_EQ(keeper.alive, kept) << room;
@@ -287,7 +287,7 @@ TEST_F(TimelineTest, WhatTooManyMessagesFollowCountsAsReceived) {
                                               {TimelineBounds{.ahead = 12}, 0, 0},
                                               {TimelineBounds{.ahead = 11}, 1, 1},
                                               {TimelineBounds{.ahead = 0}, 12, 12},
-                                              {TimelineBounds{.obstacles = 5 * each}, 7, 0},
+                                              {TimelineBounds{.obstacles = 5 * each}, 6, 0},
                                               {TimelineBounds{.obstacles = 0}, 11, 0}}) {
     Keeper keeper;
     keeper.Read(config_, logs_, bounds);
@@ -313,7 +313,7 @@ TEST(KeptObstaclesTest, CountsASetAndAGridOnce) {
   const Obstacle grid = Obstacle::Grid(std::make_shared<const OccupancyGrid>(map));
   const Obstacle circle = Obstacle::Circle(Eigen::Vector2d(0, 0), 1);
   const std::vector<Obstacle> one{grid, circle}, other{circle, circle, grid}, none;
-  KeptObstacles kept(6);
+  KeptObstacles kept(1);
   kept.Add(none);
   kept.Add(one);
   kept.Add(one);
@@ -321,7 +321,7 @@ TEST(KeptObstaclesTest, CountsASetAndAGridOnce) {
   EXPECT_FALSE(kept.AreTooMany());
   kept.Add(other);
   EXPECT_EQ(kept.size(), 7u);
-  EXPECT_TRUE(kept.AreTooMany());
+  EXPECT_TRUE(kept.AreTooMany()) << "two beside what the newest has";
   kept.Remove(one);
   EXPECT_EQ(kept.size(), 7u) << "it is still kept elsewhere";
   kept.Remove(one);
@@ -329,6 +329,16 @@ TEST(KeptObstaclesTest, CountsASetAndAGridOnce) {
   kept.Remove(other);
   kept.Remove(none);
   EXPECT_EQ(kept.size(), 0u);
+
+  // A task's grid is in every set.
+  const std::vector<Obstacle> next{grid, circle};
+  KeptObstacles two_more(2), none_more(0);
+  for (KeptObstacles* some : {&two_more, &none_more})
+    for (const auto* set : {&one, &next}) some->Add(*set);
+  EXPECT_FALSE(two_more.AreTooMany());
+  EXPECT_TRUE(none_more.AreTooMany());
+  none_more.Remove(one);
+  EXPECT_FALSE(none_more.AreTooMany());
 }
 
 // By the parts of a set, too: where it changes, where it is complete, and where it never is.
