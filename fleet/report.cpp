@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 #include <sstream>
 #include <string_view>
 
@@ -19,15 +20,15 @@ constexpr int kMostRows = 1000;  // of a table
 
 constexpr const char* kGroups = R"sql(
   WITH groups AS MATERIALIZED (
-    SELECT robot, log_file, declaration_digest, outcome, cause, event_utime / 86400000000 AS day, count(*) AS n,
+    SELECT robot, log_file, declaration_digest, outcome, cause, event_utime / 86400000000 AS day, shadow, count(*) AS n,
            min(event_number) AS event, min(event_utime) AS first, max(event_utime) AS last
-    FROM decisions GROUP BY 1, 2, 3, 4, 5, 6),
+    FROM decisions GROUP BY 1, 2, 3, 4, 5, 6, 7),
   withdrawn AS MATERIALIZED (
     SELECT robot, log_file, count(*) AS n, min(event_number) AS event FROM execution_events WHERE kind = 'withdrawn'
     GROUP BY 1, 2),
   runs_of AS (
     SELECT robot, log_file, sum(n) AS n, coalesce(sum(n) FILTER (WHERE outcome = 'certified'), 0) AS certified,
-           coalesce(sum(n) FILTER (WHERE cause = 'shadow'), 0) AS shadow,
+           coalesce(sum(n) FILTER (WHERE shadow = 1), 0) AS shadow,
            coalesce(sum(n) FILTER (WHERE outcome = 'abstain_falsified'), 0) AS contradictions
     FROM groups GROUP BY 1, 2),
   declared AS (
@@ -44,7 +45,7 @@ constexpr const char* kGroups = R"sql(
 )sql";
 
 constexpr const char* kTrend = "certified % by day";
-constexpr const char* kShadow = "shadow";  // that a gate in shadow mode would have certified
+constexpr const char* kShadow = "shadow";  // decisions that were made in shadow mode
 
 // Whose numbers lead to runs.
 constexpr std::array<std::string_view, 9> kNumbers = {
@@ -233,20 +234,19 @@ void AddRow(const FleetTable& table, std::size_t number, const std::string& runs
   rows += "</tr>\n";
 }
 
-// Robots with plans that their gates in shadow mode would have certified; others in shadow mode are not told.
+// Whose decisions some table counts in shadow mode.
 std::string ShadowsIn(const std::vector<FleetTable>& tables) {
-  std::string names;
+  std::set<std::string> names;
   for (const FleetTable& table : tables) {
-    if (table.title != "Robots") continue;
-    const std::size_t shadow = Find(table.columns, kShadow);
+    const std::size_t robot = Find(table.columns, "robot"), shadow = Find(table.columns, kShadow);
     for (const auto& row : table.rows)
-      if (row.at(shadow) != "0") names.append(1, ' ').append(Escaped(Printable(row[0])));
+      if (robot < row.size() && shadow < row.size() && row[shadow] != "0") names.insert(Escaped(Printable(row[robot])));
   }
-  if (names.empty()) return "<p>No plan is one that a gate in shadow mode would have certified.</p>\n";
+  if (names.empty()) return "<p>No gate was in shadow mode.</p>\n";
   return fmt::format(
-      "<p><b>In shadow mode:{}.</b> Their gates certified nothing there. Column <i>{}</i> counts plans that they would "
-      "have certified.</p>\n",
-      names, kShadow);
+      "<p><b>In shadow mode: {}.</b> Column <i>{}</i> counts decisions in that mode, which certify nothing; cause "
+      "<i>shadow</i> are plans that would have been certified.</p>\n",
+      fmt::join(names, " "), kShadow);
 }
 
 }  // namespace

@@ -170,7 +170,7 @@ Database::Database(const std::string& path) : path_(path), handle_(nullptr, &sql
     Execute("PRAGMA journal_mode = WAL");
     Execute(kLazily);
     insert_decision_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO decisions VALUES
-      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
+      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
       ON CONFLICT (log_file, event_number) DO NOTHING)sql");
     insert_event_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO execution_events VALUES
       (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number) DO NOTHING)sql");

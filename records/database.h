@@ -48,7 +48,7 @@ struct RowMarks {
 
 class Database final {
  public:
-  static constexpr int kSchemaVersion = 6;  ///< PRAGMA user_version: another one after every change of the tables.
+  static constexpr int kSchemaVersion = 7;  ///< PRAGMA user_version: another one after every change of the tables.
 
   /** Creates the file, or opens it.
   @throws DatabaseError if it cannot be opened, belongs to another program or has another schema. */

@@ -109,7 +109,8 @@ Cells CellsOf(const std::string& robot, const DecisionRow& row, const candidate_
               {"margin", row.margin},
               {"threshold", row.threshold},
               {"elapsed_us", row.elapsed_us},
-              {"latency_us", row.latency_us}});
+              {"latency_us", row.latency_us},
+              {"shadow", Index(row.shadow)}});
   AddCandidate(cells, candidate);
   Add(cells, {{"message", row.message}, {"plan_digest", row.plan_digest}});
   for (std::size_t i = 0; i < row.grounds.size(); ++i) cells.emplace_back(kGroundNames[i], row.grounds[i]);

@@ -124,11 +124,15 @@ void Interpreter::Observe(const LogEvent& event, Rows& rows) {
     if (const auto decision = Decoded<decision_t>(event.message())) {
       DecisionRow row = MakeRow(*decision, reference());
       row.latency_us = LatencyUs(*decision, event.utime);
+      row.shadow = decision->cause == decision_t::CAUSE_SHADOW ? 1 : shadow_;
       rows.decisions.push_back(std::move(row));
     }
   } else if (event.channel == channels_.event) {
     if (const auto execution = Decoded<execution_event_t>(event.message()))
       rows.events.push_back(MakeRow(*execution, reference()));
+  } else if (event.channel == channels_.status) {
+    if (const auto heartbeat = Decoded<certifier_status_t>(event.message()); heartbeat && IsInCharge(*heartbeat))
+      shadow_ = heartbeat->shadow != 0 ? 1 : 0;
   } else if (event.channel == channels_.transition) {
     if (const auto transition = Decoded<transition_t>(event.message()))
       rows.transitions.push_back(MakeRow(*transition, reference()));

@@ -69,6 +69,7 @@ class Interpreter final {
   LogAuthenticator authenticator_;
   std::map<Stream, Count> streams_;
   Undecided<std::int64_t> candidates_{kMaxCandidates};  // when each was received
+  int shadow_ = -1;                                     // of the last heartbeat of the certifier in charge
 };
 
 }  // namespace forereach

@@ -46,6 +46,7 @@ Row Adjusted(Row derived, const Row&) {
 }
 DecisionRow Adjusted(DecisionRow derived, const DecisionRow& recorded) {
   if (std::isnan(derived.latency_us)) derived.latency_us = recorded.latency_us;
+  if (derived.cause != "shadow") derived.shadow = recorded.shadow;
   return derived;
 }
 

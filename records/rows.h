@@ -32,6 +32,7 @@ struct DecisionRow {
   double margin = kNoNumber, threshold = kNoNumber, elapsed_us = kNoNumber;
   /** The time between the receipts of candidate and decision at the logger. Unknown if the log lacks the candidate. */
   double latency_us = kNoNumber;
+  int shadow = -1;  ///< 1 or 0: whether it was made in shadow mode, by itself or the last heartbeat; -1: not known.
   std::string plan_digest;
   std::array<std::string, kGrounds.size()> grounds;  ///< In the order of kGrounds.
 };

@@ -27,7 +27,7 @@ inline constexpr const char* kTables = R"sql(
     source TEXT NOT NULL, plan_id BIGINT NOT NULL, outcome TEXT NOT NULL, cause TEXT NOT NULL,
     step BIGINT, coordinate BIGINT, obstacle BIGINT, first_observation BIGINT, second_observation BIGINT,
     margin DOUBLE PRECISION, threshold DOUBLE PRECISION, elapsed_us DOUBLE PRECISION, latency_us DOUBLE PRECISION,
-    message TEXT NOT NULL,
+    shadow BIGINT, message TEXT NOT NULL,
     plan_digest TEXT NOT NULL, config_digest TEXT NOT NULL, model_digest TEXT NOT NULL,
     declaration_digest TEXT NOT NULL, observations_digest TEXT NOT NULL, obstacles_digest TEXT NOT NULL,
     event_digest TEXT NOT NULL, {unique} ({key})){partitioned};
@@ -85,8 +85,9 @@ auto ColumnsOf(auto& row) {
                                    row.candidate_utime, row.sequence, row.source, row.plan_id, row.outcome, row.cause),
                           std::tuple(OrNull{row.step}, OrNull{row.coordinate}, OrNull{row.obstacle},
                                      OrNull{row.first_observation}, OrNull{row.second_observation}),
-                          std::tie(row.margin, row.threshold, row.elapsed_us, row.latency_us, row.message,
-                                   row.plan_digest, row.grounds, row.event.digest));
+                          std::tie(row.margin, row.threshold, row.elapsed_us, row.latency_us),
+                          std::tuple(OrNull{row.shadow}),
+                          std::tie(row.message, row.plan_digest, row.grounds, row.event.digest));
   else if constexpr (std::is_same_v<Row, EventRow>)
     return std::tuple_cat(
         std::tie(row.event.log_file, row.event.event_number, row.event.utime, row.utime, row.sequence),

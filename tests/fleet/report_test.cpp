@@ -92,7 +92,7 @@ TEST_F(FleetReportTest, IsATextADocumentOrAPage) {
                                 HasSubstr("pages/%3Cb%3Er3%3C%2Fb%3E/x%22%26.lcmlog.html")));
   EXPECT_THAT(Read(page), AllOf(HasSubstr("<a href=\"#Robots-1\">2</a>"), HasSubstr("points=\"0,2 4,8 \""),
                                 HasSubstr("<td><a href=\"../pages/r2/a.lcmlog.html\">100.0</a></td>"),
-                                HasSubstr("No plan is one that a gate in shadow mode"),
+                                HasSubstr("No gate was in shadow mode"),
                                 HasSubstr("<code>forereach report LOG --out ../pages/ROBOT")));
   EXPECT_THAT(Forereach(database + " --out " + page + " 2>&1"), Exits(2, page));
 }
@@ -100,20 +100,21 @@ TEST_F(FleetReportTest, IsATextADocumentOrAPage) {
 TEST_F(FleetReportTest, NamesTheRobotsInShadowMode) {
   AddFleet();
   Rows rows;
-  for (const std::string cause : {"shadow", "shadow", "fault"}) {
+  for (const std::string cause : {"domain", "obstacle", "fault"}) {
     DecisionRow& row = rows.decisions.emplace_back();
     row.event = {"s.lcmlog", std::ssize(rows.decisions), cause + std::to_string(rows.decisions.size()), kFirst};
     row.outcome = "rejected";
     row.cause = cause;
+    row.shadow = 1;
   }
   Store store(server_->Address());
   for (const std::string robot : {"r2", "r5<i>"}) static_cast<void>(store.Write(robot, rows));
   const std::vector<FleetTable> tables = ReadFleet(store);
-  EXPECT_THAT(tables.front().rows.front(), (Row{"r5<i>", "3", "0.0", "2", "0", "0", "1", "0.0", "s.lcmlog"}));
-  EXPECT_THAT(tables.back().rows, Contains(Row{"r2", "s.lcmlog", "3", "0.0", "2", "0"}));
+  EXPECT_THAT(tables.front().rows.front(), (Row{"r5<i>", "3", "0.0", "3", "0", "0", "1", "0.0", "s.lcmlog"}));
+  EXPECT_THAT(tables.back().rows, Contains(Row{"r2", "s.lcmlog", "3", "0.0", "3", "0"}));
   const std::string html = FleetHtml(tables, "pages");
-  EXPECT_THAT(html, AllOf(HasSubstr("<b>In shadow mode: r5&lt;i&gt; r2.</b>"),
-                          HasSubstr("<td><a href=\"pages/r5%3Ci%3E/s.lcmlog.html\">2</a></td>")));
+  EXPECT_THAT(html, AllOf(HasSubstr("<b>In shadow mode: r2 r5&lt;i&gt;.</b>"),
+                          HasSubstr("<td><a href=\"pages/r5%3Ci%3E/s.lcmlog.html\">3</a></td>")));
 }
 
 // From every number to the page of a run, which is there.

@@ -150,8 +150,8 @@ TEST_F(StoreTest, PutsEachMonthIntoAPartOfItsOwn) {
   EXPECT_EQ(server_
                 ->Sql("INSERT INTO decisions SELECT robot, log_file, event_number, event_utime + 86400000000 * 40, "
                       "utime, candidate_utime, sequence, source, plan_id, outcome, cause, step, coordinate, obstacle, "
-                      "first_observation, second_observation, margin, threshold, elapsed_us, latency_us, message, "
-                      "plan_digest, config_digest, model_digest, declaration_digest, observations_digest, "
+                      "first_observation, second_observation, margin, threshold, elapsed_us, latency_us, shadow, "
+                      "message, plan_digest, config_digest, model_digest, declaration_digest, observations_digest, "
                       "obstacles_digest, event_digest FROM decisions_2026_01")
                 .code,
             0);
@@ -216,7 +216,7 @@ TEST_F(StoreTest, SaysInItsOwnWordsWhyItRefuses) {
               HasSubstr("refuses this user, password or database"));
   server_->Sql("UPDATE forereach_schema SET version = 9");
   EXPECT_THAT(Thrown<StoreError>([&] { static_cast<void>(Store(server_->Address()).Runs("r1")); }),
-              HasSubstr("schema version 9, this program knows version 6"));
+              HasSubstr("schema version 9, this program knows version 7"));
 }
 
 TEST_F(StoreTest, GoesOnAfterTheServerWasKilled) {

@@ -23,6 +23,7 @@ Rows SampleRows() {
                          .margin = 0.1,
                          .threshold = -INFINITY,
                          .elapsed_us = 1.5,
+                         .shadow = 0,
                          .plan_digest = "00ff"}},
           .events = {{.event = {"a.lcmlog", 8, "e8"}, .kind = "goal_reached", .state = {0.1, -2, 1e300}, .value = 0.7}},
           .gaps = {{{"a.lcmlog", 9, "f9"}, "C", "s", 4, 6, 2, 15, "bus"}},
@@ -50,7 +51,7 @@ TEST_F(DatabaseTest, RowsSurviveARoundTrip) {
                 (source, "planner"), (outcome, "abstain_safety"), (cause, "obstacle"),
                 (message, SampleRows().decisions[0].message), (step, 3), (coordinate, 4), (obstacle, 5),
                 (first_observation, 6), (second_observation, 8), (margin, 0.1), (threshold, -INFINITY),
-                (elapsed_us, 1.5));
+                (elapsed_us, 1.5), (shadow, 0));
   EXPECT_TRUE(std::isnan(decision.latency_us));
   EXPECT_FIELDS(decision, (plan_digest, "00ff"), (event.digest, "d7"));
   EXPECT_FIELDS(Only(rows.events), (kind, "goal_reached"), (state, (std::vector<double>{0.1, -2, 1e300})), (value, 0.7),

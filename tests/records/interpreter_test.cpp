@@ -1,6 +1,8 @@
 // Sequence numbers: missing, late and repeated messages, and restarts; rows of executed steps.
 #include "records/interpreter.h"
 
+#include "forereach/certifier_status_t.hpp"
+
 #include "tests/records/logs.h"
 
 namespace forereach::interpreter_test {
@@ -36,6 +38,29 @@ TEST_F(InterpreterTest, AnExecutedStepIsARowWhateverItsCounts) {
                 (input, std::vector<double>{2}), (next_state, (std::vector<double>{3, 0})), (event.event_number, 0));
   EXPECT_TRUE(rows_.transitions[1].state.empty());
   EXPECT_EQ(rows_.transitions[2].next_state.size(), 16u);
+}
+
+TEST_F(InterpreterTest, ADecisionIsInTheModeOfTheLastHeartbeatOfTheOneInCharge) {
+  const auto hear = [this](const std::string& channel, const auto& message) {
+    interpreter_.Observe({number_++, kNow + number_, channel, Encode(message)}, rows_);
+  };
+  const auto decide = [&](std::int16_t cause) {
+    decision_t decision{.outcome = decision_t::REJECTED, .cause = cause};
+    hear("PLAN_DECISION", decision);
+    return rows_.decisions.back().shadow;
+  };
+  const auto beat = [&](std::int16_t state, std::int16_t shadow) {
+    hear("CERTIFIER_STATUS", certifier_status_t{.state = state, .shadow = shadow});
+  };
+  EXPECT_EQ(decide(decision_t::CAUSE_FAULT), -1);
+  EXPECT_EQ(decide(decision_t::CAUSE_SHADOW), 1);
+  EXPECT_EQ(decide(decision_t::CAUSE_FAULT), -1);
+  beat(certifier_status_t::DISARMED, 1);
+  interpreter_.Continue("next");
+  EXPECT_EQ(decide(decision_t::CAUSE_FAULT), 1) << "also in the run's next file";
+  beat(certifier_status_t::ARMED, 0);
+  beat(certifier_status_t::STANDBY, 1);
+  EXPECT_EQ(decide(decision_t::CAUSE_FAULT), 0);
 }
 
 TEST_F(InterpreterTest, AMessageThatComesTwiceIsNoLoss) {
