@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -344,7 +343,7 @@ class ObstacleReader {
 struct Lanelet {
   std::string id;
   Ring left, right, area;
-  bool has_left = false, has_right = false;  // a neighbour
+  std::string left_id, right_id;  // its neighbours'
   PlanePoint lower, upper;
 };
 
@@ -354,12 +353,10 @@ class RoadReader {
       : in_(in), thickness_(thickness), world_(world) {}
 
   void Read(const XmlElement& root) {
-    std::set<std::string> ids;
-    for (const XmlElement* at : root.All("lanelet")) ids.insert(IdOf(*at));
-    for (const XmlElement* at : root.All("lanelet")) lanelets_.push_back(ReadLanelet(*at, ids));
+    for (const XmlElement* at : root.All("lanelet")) lanelets_.push_back(ReadLanelet(*at));
     for (const Lanelet& lanelet : lanelets_) {
-      if (!lanelet.has_left) AddBound(lanelet, lanelet.left, "left bound of lanelet " + lanelet.id);
-      if (!lanelet.has_right) AddBound(lanelet, lanelet.right, "right bound of lanelet " + lanelet.id);
+      AddBound(lanelet, lanelet.left, lanelet.left_id, "left bound of lanelet " + lanelet.id);
+      AddBound(lanelet, lanelet.right, lanelet.right_id, "right bound of lanelet " + lanelet.id);
     }
   }
 
@@ -372,21 +369,20 @@ class RoadReader {
     return id ? *id : "?";
   }
 
-  // A neighbour that the file does not have is none.
-  [[nodiscard]] static bool HasNeighbour(const XmlElement& at, const char* side, const std::set<std::string>& ids) {
+  [[nodiscard]] static std::string NeighbourOf(const XmlElement& at, const char* side) {
     const XmlElement* neighbour = at.Find(side);
     const std::string* id = neighbour ? neighbour->Attribute("ref") : nullptr;
-    return id && ids.contains(*id);
+    return id ? *id : "";
   }
 
-  [[nodiscard]] Lanelet ReadLanelet(const XmlElement& at, const std::set<std::string>& ids) const {
+  [[nodiscard]] Lanelet ReadLanelet(const XmlElement& at) const {
     Lanelet lanelet;
     lanelet.id = IdOf(at);
     lanelet.left = in_.Points(in_.Require(at, "leftBound"));
     lanelet.right = in_.Points(in_.Require(at, "rightBound"));
     if (lanelet.left.size() < 2 || lanelet.right.size() < 2) in_.Fail(at, "a bound has fewer than two points");
-    lanelet.has_left = HasNeighbour(at, "adjacentLeft", ids);
-    lanelet.has_right = HasNeighbour(at, "adjacentRight", ids);
+    lanelet.left_id = NeighbourOf(at, "adjacentLeft");
+    lanelet.right_id = NeighbourOf(at, "adjacentRight");
     lanelet.area = lanelet.right;
     lanelet.area.insert(lanelet.area.end(), lanelet.left.rbegin(), lanelet.left.rend());
     lanelet.lower = lanelet.upper = lanelet.area.front();
@@ -407,12 +403,36 @@ class RoadReader {
     });
   }
 
-  void AddBound(const Lanelet& own, const Ring& bound, const std::string& name) {
+  // Whether the segment lies along the neighbour, which the file may lack.
+  [[nodiscard]] bool IsBeside(const Lanelet& own, const std::string& neighbour, const PlanePoint& a,
+                              const PlanePoint& b) const {
+    constexpr double kPiece = 0.5, kMostPieces = 1e4;
+    const double x = b.x - a.x, y = b.y - a.y, pieces = std::ceil(std::hypot(x, y) / kPiece);
+    if (neighbour.empty() || !(pieces <= kMostPieces)) return false;
+    return std::ranges::any_of(lanelets_, [&](const Lanelet& other) {
+      if (&other == &own || other.id != neighbour) return false;
+      for (double i = 0; i <= pieces; ++i)
+        if (!IsNearTo(other.area, {a.x + x * (i / pieces), a.y + y * (i / pieces)})) return false;
+      return true;
+    });
+  }
+  [[nodiscard]] static bool IsNearTo(const Ring& area, const PlanePoint& p) {
+    for (std::size_t i = 0; i < area.size(); ++i) {
+      const PlanePoint &a = area[i], &b = area[(i + 1) % area.size()];
+      const double x = b.x - a.x, y = b.y - a.y, square = x * x + y * y;
+      const double share = square > 0 ? std::clamp(((p.x - a.x) * x + (p.y - a.y) * y) / square, 0.0, 1.0) : 0;
+      if (std::hypot(p.x - a.x - share * x, p.y - a.y - share * y) <= CommonRoadOptions::kBeside) return true;
+    }
+    return false;
+  }
+
+  void AddBound(const Lanelet& own, const Ring& bound, const std::string& neighbour, const std::string& name) {
     Ring run{bound.front()};
     for (std::size_t i = 0; i + 1 < bound.size(); ++i) {
       if (bound[i] == bound[i + 1]) continue;
-      if (IsOnTheRoad(own, bound[i], bound[i + 1])) {
-        ++inside_;
+      const bool is_beside = IsBeside(own, neighbour, bound[i], bound[i + 1]);
+      if (is_beside || IsOnTheRoad(own, bound[i], bound[i + 1])) {
+        inside_ += is_beside ? 0 : 1;
         if (run.size() > 1) world_.Add(name, run);
         run = {bound[i + 1]};
         continue;
@@ -483,9 +503,10 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
   for (const auto& [kind, count] : counts) text += fmt::format(", {} {}", count, kind);
   world.notes.insert(world.notes.begin(), text + ".");
   world.notes.push_back(fmt::format(
-      "The boundary: bounds of lanelets without a neighbour there; {} segments inside another lanelet are left out. "
+      "The boundary: bounds of lanelets where no neighbour is within {} m; {} segments inside another lanelet are left "
+      "out. "
       "Lanelets have open ends, and a change to a neighbour's lane in the other direction is allowed.",
-      road.inside()));
+      CommonRoadOptions::kBeside, road.inside()));
   if (obstacles.without_orientation() > 0)
     world.notes.push_back(
         fmt::format("{} states have no orientation: there an obstacle covers what it does whichever way it looks.",

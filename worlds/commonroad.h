@@ -13,11 +13,14 @@ struct CommonRoadOptions {
   double thickness = 0.05;
   /** A window covers so many time steps. More make fewer and larger pieces. */
   int steps_per_window = 1;
+  /** So near to a neighbour's bound a lanelet's own is none, m: files round, and sample both bounds differently. */
+  static constexpr double kBeside = 0.1;
 };
 
-/** The boundary is the left bound of each lanelet without a left neighbour and the right bound of each without a right
-one, but for segments inside another lanelet, as in crossings; lanelets have open ends. A segment is a set without
-width, which certificates at all times do not let through.
+/** The boundary is each lanelet's left bound but where it lies along its left neighbour, and its right bound likewise,
+and but for segments inside another lanelet, as in crossings; lanelets have open ends. So what lies between two
+neighbours, as a median does, is no road, nor what is beyond the end of a neighbour. A segment is a set without width,
+which certificates at all times do not let through.
 
 An obstacle that stands is its shape, grown by what its intervals of position and orientation allow. Of one that moves,
 a window [t_i, t_i+k] holds the convex hull of all its occupancies there. It contains the motion from one state to the

@@ -59,6 +59,22 @@ TEST_F(CommonRoadTest, TheBoundaryIsWhereNoNeighbourIs) {
   EXPECT_EQ(world.pieces.size(), 3u);
 }
 
+TEST_F(CommonRoadTest, BetweenNeighboursThatAreApartAndBeyondTheEndOfOneIsNoRoad) {
+  const auto road = [this](double gap, double end, const std::string& neighbour = "2") {
+    return Scenario(Lanelet(1, {{0, 4}, {20, 4}, {40, 4}}, {{0, 0}, {40, 0}},
+                            "<adjacentLeft ref=\"" + neighbour + "\" drivingDir=\"opposite\"/>") +
+                    Lanelet(2, {{end, 4 + gap}, {7, 4 + gap}, {0, 4 + gap}}, {{end, 8}, {0, 8}},
+                            "<adjacentLeft ref=\"1\" drivingDir=\"opposite\"/>"));
+  };
+  EXPECT_EQ(road(0, 40).pieces.size(), 2u);
+  EXPECT_EQ(road(0.1, 40).pieces.size(), 2u) << "files round";
+  const World median = road(0.11, 40), shorter = road(0, 20), itself = road(0, 40, "1");
+  EXPECT_TRUE(Contains(median, At(10, 4)) && Contains(median, At(30, 4)));
+  EXPECT_TRUE(Contains(median, {Rational(10), Rational(4 + 0.11)}));
+  EXPECT_TRUE(Contains(shorter, At(30, 4)) && !Contains(shorter, At(10, 4)));
+  EXPECT_TRUE(Contains(itself, At(10, 4)));
+}
+
 TEST_F(CommonRoadTest, In2018bTheRoleOfAnObstacleIsAnElement) {
   kHead = "<commonRoad timeStepSize=\"0.1\" commonRoadVersion=\"2018b\">\n";
   const World world = Scenario(
