@@ -369,7 +369,8 @@ const DroppedWords& WordsOf(Dropped dropped) {
        "raise --tolerance-ms, or let model.dt be a multiple of the log's spacing"},
       {"no_state", "starts with a state that is no number", "write these fields as decimal numbers"},
       {"no_input", "starts with an input that is no number",
-       "write these fields as decimal numbers; inputs in rows of their own can be given with --inputs-from"},
+       "write these fields as decimal numbers; inputs in rows of their own can be given with --inputs-from, "
+       "whose last row holds no longer than its stamp"},
       {"input_changes", "starts whose input is not constant over the step", "give --input-mean or --input-tolerance"},
       {"outside_domain", "starts outside the task's domain",
        "widen the task's domain, or give the columns' units with --unit"},
