@@ -2,6 +2,7 @@
 #include "records/interpreter.h"
 
 #include "forereach/certifier_status_t.hpp"
+#include "forereach/transition_t.hpp"
 
 #include "tests/records/logs.h"
 
