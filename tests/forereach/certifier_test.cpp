@@ -484,6 +484,9 @@ TEST(Certifier, AnErrorOfTheRecordExplainsDataThatContradictEachOtherWithoutIt) 
   EXPECT_TRUE(Judge(problem).certifier().violation());
   problem.declaration.state_error[kVx] = 0.125;  // of each of two records, before and after the step
   EXPECT_FALSE(Judge(problem).certifier().violation());
+  problem.declaration.given_are_exact = true;
+  EXPECT_TRUE(Judge(problem).certifier().violation());
+  problem.declaration.given_are_exact = false;
   problem.declaration.state_error[kVx] = 0.125 * (1 - 0x1p-50);
   EXPECT_TRUE(Judge(problem).certifier().violation());
   problem.declaration.state_error[kVx] = 0;

@@ -441,7 +441,8 @@ class MotionTrial {
     }
   }
 
-  // Of steps that are recorded with errors; what it is given is exact. Null where something else is untold.
+  // Of steps that are recorded with errors; what it is given is exact. Null where something else is untold, or what is
+  // given shows a faster motion than is declared, as no true motion does.
   std::unique_ptr<Certifier> MakeLearner(const Problem& truth) const {
     if (untold_ != Untold::kNothing && untold_ < Untold::kStateErrors) return nullptr;
     auto problem = std::make_shared<Problem>(*told_);
@@ -451,7 +452,8 @@ class MotionTrial {
         Eigen::VectorXd::NullaryExpr(truth.model->num_states(), [this](Eigen::Index k) { return ToldStateError(k); });
     if (untold_ == Untold::kInputErrors) declaration.input_error.setZero();
     problem->transitions = truth.transitions;
-    return std::make_unique<Certifier>(problem);
+    auto learner = std::make_unique<Certifier>(problem);
+    return learner->violation() ? nullptr : std::move(learner);
   }
 
   // Whether a motion within the declared rates can have made a step: another one is not true.
