@@ -441,19 +441,20 @@ class MotionTrial {
     }
   }
 
-  // Of steps that are recorded with errors; what it is given is exact. Null where something else is untold, or what is
-  // given shows a faster motion than is declared, as no true motion does.
-  std::unique_ptr<Certifier> MakeLearner(const Problem& truth) const {
+  // Of steps that are recorded with errors; what it is given may be exact. Null where something else is untold, or what
+  // is given shows a faster motion than is declared, as no true motion does.
+  std::unique_ptr<Certifier> MakeLearner(const Problem& truth) {
     if (untold_ != Untold::kNothing && untold_ < Untold::kStateErrors) return nullptr;
     auto problem = std::make_shared<Problem>(*told_);
     Declaration& declaration = problem->declaration;
-    declaration.given_are_exact = true;
+    declaration.given_are_exact = untold_ != Untold::kNothing || records_.Coin();
     declaration.state_error =
         Eigen::VectorXd::NullaryExpr(truth.model->num_states(), [this](Eigen::Index k) { return ToldStateError(k); });
     if (untold_ == Untold::kInputErrors) declaration.input_error.setZero();
-    problem->transitions = truth.transitions;
+    if (declaration.given_are_exact) problem->transitions = truth.transitions;
     auto learner = std::make_unique<Certifier>(problem);
-    return learner->violation() ? nullptr : std::move(learner);
+    const bool is_too_fast = learner->violation() && learner->violation()->second == -1;
+    return is_too_fast ? nullptr : std::move(learner);
   }
 
   // Whether a motion within the declared rates can have made a step: another one is not true.
