@@ -411,7 +411,9 @@ std::vector<Eigen::VectorXd> Slice::RoundedColumns() const {
 // The bounds on r_k over one Z_t from data and declaration.
 struct TubeMaker::Known {
   Bounds bounds;
-  bool contradiction = false;  // one that doubles show too
+  bool contradiction = false;       // one that doubles show too
+  std::vector<double> slopes = {};  // of which the bounds are less
+  bool is_tie = false;              // rounding may have chosen other slopes
 };
 
 // The affine rows of the residual, for one tube. The others are null.
@@ -419,16 +421,15 @@ struct TubeMaker::Affine {
   const std::vector<int>& columns;
   std::vector<std::unique_ptr<AffineRow>> rows;
 
-  /** The slope of state k's residual by state l. */
-  [[nodiscard]] double Slope(std::size_t k, std::size_t l) const {
-    const auto found = std::ranges::lower_bound(columns, static_cast<int>(l));
-    if (!rows[k] || found == columns.end() || *found != static_cast<int>(l)) return 0;
-    return rows[k]->slopes()[ToSize(static_cast<int>(found - columns.begin()))];
+  /** The slopes of state k's residual by n states. */
+  [[nodiscard]] std::vector<double> Slopes(std::size_t k, std::size_t n) const {
+    std::vector<double> slopes(n);
+    for (std::size_t j = 0; j < columns.size(); ++j)
+      if (ToSize(columns[j]) < n) slopes[ToSize(columns[j])] = rows[k]->slopes()[j];
+    return slopes;
   }
   /** Bounds on the residual of k less its slope times x - c: at the center, and beyond by what the slope may be off. */
   [[nodiscard]] std::optional<Bounds> Enclose(const Query& query, std::size_t k) const;
-  /** sum over the slice's states of |slope| r. */
-  [[nodiscard]] Real Spread(const Query& query, std::size_t k) const;
 };
 
 // Z_t = X_t x {u_t}: the slice, and center, half-width and hull of every variable.
@@ -472,13 +473,6 @@ std::optional<Bounds> TubeMaker::Affine::Enclose(const Query& query, std::size_t
   const std::optional<Real> upper = rows[k]->Upper(at), lower = rows[k]->Lower(at);
   if (!upper || !lower) return std::nullopt;
   return Bounds{*lower - around, *upper + around};
-}
-
-Real TubeMaker::Affine::Spread(const Query& query, std::size_t k) const {
-  Real sum;
-  if (!rows[k]) return sum;
-  for (std::size_t l = 0; l < query.slice.center.size(); ++l) sum += abs(Real(Slope(k, l))) * query.half_width[l];
-  return sum;
 }
 
 // What the offsets of the boundaries of a step add: d, and what is added without correlation.
@@ -881,13 +875,17 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
       const std::optional<Bounds> affine = query.affine.Enclose(query, ToSize(k));
       if (!affine) return no_bound("the affine residual");
       step.envelope.push_back(*affine);
+      step.slopes.push_back(query.affine.Slopes(ToSize(k), ToSize(n)));
       continue;
     }
-    const auto& [bounds, contradiction] = Envelope(query, k, options.known);
+    const auto& [bounds, contradiction, slopes, is_tie] = Envelope(query, k, options.known);
+    if (is_tie)
+      return Failure{query.t, "the slopes of a residual with regions are known to the last bit", "a tie", "", false};
     if (contradiction)
       return Failure{query.t, "some residual is consistent with data and declaration", bounds.lower.text(),
                      "at most " + bounds.upper.text()};
     step.envelope.push_back(equations_.IsExact() ? bounds : Outermost(bounds));
+    step.slopes.push_back(slopes);
   }
 
   const RecordedSet* const recorded = options.follow ? &(*options.follow)[tube.slices.size()] : nullptr;
@@ -896,7 +894,7 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   for (std::size_t k = 0; k < unexpected.size(); ++k) unexpected[k] += of_inputs_[k];
   const Offset offset = OffsetOf(query, step, input_spread, unexpected, recorded);
   std::vector<Real> slack(ToSize(n));
-  Slice next = Image(query, offset, slack);
+  Slice next = Image(query, step, offset, slack);
   const Real half(0.5);
   const Box& domain = problem_.domain.state;
   for (int k = 0; k < n; ++k) {  // diag(q)
@@ -986,17 +984,18 @@ TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const Step& step, cons
     } else if (declared(k) < kNone) {
       offset.spread[k] = ends * (error * Real(declared(k)) + abs(offset.column[k]));
     } else {
-      const Real unknown =
-          max(abs(envelope[k].lower), abs(envelope[k].upper)) + query.affine.Spread(query, k) + unexpected[k];
+      Real unknown = max(abs(envelope[k].lower), abs(envelope[k].upper)) + unexpected[k];
+      for (std::size_t l = 0; l < step.slopes[k].size(); ++l)
+        unknown += abs(Real(step.slopes[k][l])) * query.half_width[l];
       offset.spread[k] = ends * (moved[k] - offset.column[k]).magnitude() + growth * unknown;
     }
   }
   return offset;
 }
 
-// <f0(c), (J + A) G>, A the slopes of affine rows. With parameters that are intervals, the middles; `slack` then is set
+// <f0(c), (J + A) G>, A the step's slopes. With parameters that are intervals, the middles; `slack` then is set
 // to what they may be off, coordinate by coordinate, the slice's own slack included.
-Slice TubeMaker::Image(const Query& query, const Offset& offset, std::vector<Real>& slack) const {
+Slice TubeMaker::Image(const Query& query, const Step& step, const Offset& offset, std::vector<Real>& slack) const {
   const std::size_t n = slack.size(), num_columns = query.slice.columns.size() - query.slice.num_slack;
   Slice next;
   next.center = equations_.Value(query.center);
@@ -1008,8 +1007,8 @@ Slice TubeMaker::Image(const Query& query, const Offset& offset, std::vector<Rea
       if (ToSize(variable) < n && !column[ToSize(variable)].IsZero())
         image[ToSize(output)] += value * column[ToSize(variable)];
     for (std::size_t k = 0; k < n; ++k)
-      for (std::size_t l = 0; l < n && query.affine.rows[k]; ++l)
-        if (const double slope = query.affine.Slope(k, l); slope != 0) image[k] += Real(slope) * column[l];
+      for (std::size_t l = 0; l < step.slopes[k].size(); ++l)
+        if (const double slope = step.slopes[k][l]; slope != 0) image[k] += Real(slope) * column[l];
     if (static_cast<int>(j) == query.slice.offset)
       for (std::size_t k = 0; k < n; ++k) image[k] -= offset.column[k];
     if (j >= num_columns)
@@ -1259,7 +1258,9 @@ TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows&
   const auto contradicts = [](const Bounds& bounds) { return CertainlyBelow(bounds.upper, bounds.lower); };
   const Bounds bounds = intersect(false);
   // Again with doubts in their favour as large as rounding to doubles could give rise to.
-  return {bounds, contradicts(bounds) && contradicts(intersect(true))};
+  Known result{bounds, contradicts(bounds) && contradicts(intersect(true))};
+  if (!result.contradiction) Tilt(query, k, known, result);
+  return result;
 }
 
 // Bounds the size of what goes into an observation and its ways.
@@ -1315,6 +1316,27 @@ std::shared_ptr<const TubeMaker::Plane> TubeMaker::PlaneOf(int k, const KnownRow
   return plane;
 }
 
+// Bounds relative to the slopes of a plane where they are much narrower: the certifier's choice, which claims nothing.
+void TubeMaker::Tilt(const Query& query, int k, const KnownRows& rows, Known& known) const {
+  const std::vector<int> variables = ways_.Plane(k);
+  if (!ways_.Narrow(k) || variables.empty()) return;
+  const auto plane = PlaneOf(k, rows);
+  const auto slopes = plane->nodes.SlopesOver(query.center, query.half_width);
+  known.is_tie = !slopes;
+  if (!slopes || *slopes == Nodes::Slopes{}) return;
+  const auto [lower, upper] = plane->nodes.Over(query.hull, *slopes, query.center);
+  Real width = upper - lower;
+  for (std::size_t a = 0; a < variables.size(); ++a)
+    width += Real(0.53) * Real(2.0) * abs(Real((*slopes)[a])) * query.half_width[ToSize(variables[a])];
+  const double least = (known.bounds.upper - known.bounds.lower).ToDouble(), much = width.ToDouble();
+  known.is_tie = std::abs(much - least) <= 0x1p-30 * std::abs(least);
+  if (!(much < least)) return;
+  known.bounds = {lower, upper};
+  known.slopes.resize(query.slice.center.size());
+  for (std::size_t a = 0; a < variables.size(); ++a)
+    if (ToSize(variables[a]) < known.slopes.size()) known.slopes[ToSize(variables[a])] = (*slopes)[a];
+}
+
 // `bounds` narrowed by what regions say of the residual, and by ways through them. Doubles choose those that may narrow
 // them.
 void TubeMaker::AddRegions(const Query& query, int k, const KnownRows& known, bool in_doubt, Bounds& bounds) const {
@@ -1325,7 +1347,7 @@ void TubeMaker::AddRegions(const Query& query, int k, const KnownRows& known, bo
   if (!ways_.Narrow(k)) return;
   if (!ways_.Plane(k).empty()) {
     const auto plane = PlaneOf(k, known);
-    const auto [lower, upper] = plane->nodes.Over(query.hull);
+    const auto [lower, upper] = plane->nodes.Over(query.hull, {}, query.center);
     const Real doubt = in_doubt ? Real(kSeenInDoubles) * plane->size : Real();
     bounds = {max(bounds.lower, lower - doubt), min(bounds.upper, upper + doubt)};
     return;

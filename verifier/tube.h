@@ -2,7 +2,8 @@
 and (set-envelope), implemented directly. It shares data types with the certifier, but no arithmetic.
 
 For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [(J + A) G, diag(q), diag(h + w)] >,
-with A the slopes of affine rows of the residual (verifier/affine.h), zero in the others, and w the declared bound on
+with A the slopes of affine rows of the residual (verifier/affine.h), and of rows with regions where these are known
+(verifier/ways.h), zero in the others, and w the declared bound on
 the disturbance. It counts twice, for different steps: an observation's r~_i differs from r(z_i) by what disturbed that
 step, and the step from X_t is disturbed anew. So is it by inputs that are off. Where the bound grows with state and
 input, it is the largest over the box of what is known of them. */
@@ -66,8 +67,9 @@ struct Bounds {
 
 /** Intermediate results of one step, one entry for each state. */
 struct Step {
-  std::vector<Bounds> envelope;   ///< Bounds of the residual over Z_t.
-  std::vector<Bounds> remainder;  ///< Bounds of the second-order part over Z_t.
+  std::vector<Bounds> envelope;             ///< Bounds of the residual over Z_t, less its slopes times x - c.
+  std::vector<std::vector<double>> slopes;  ///< By row and state; a row without entries has none.
+  std::vector<Bounds> remainder;            ///< Bounds of the second-order part over Z_t.
 };
 
 struct Tube {
@@ -167,6 +169,7 @@ class TubeMaker final {
   struct Known;
   [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
   void AddRegions(const Query& query, int k, const KnownRows& known, bool in_doubt, Bounds& bounds) const;
+  void Tilt(const Query& query, int k, const KnownRows& rows, Known& known) const;
   [[nodiscard]] Real ScaleAt(int k, const Seen& seen) const;
   struct Plane;
   [[nodiscard]] std::shared_ptr<const Plane> PlaneOf(int k, const KnownRows& known) const;
@@ -179,7 +182,7 @@ class TubeMaker final {
                                         const std::vector<Real>& input_spread) const;
   [[nodiscard]] Offset OffsetOf(const Query& query, const Step& step, const std::vector<Real>& input_spread,
                                 const std::vector<Real>& unexpected, const RecordedSet* recorded) const;
-  [[nodiscard]] Slice Image(const Query& query, const Offset& offset, std::vector<Real>& slack) const;
+  [[nodiscard]] Slice Image(const Query& query, const Step& step, const Offset& offset, std::vector<Real>& slack) const;
   [[nodiscard]] std::optional<Failure> Advance(Tube& tube, const Query& query, const TubeOptions& options) const;
 
   const Problem& problem_;

@@ -36,8 +36,14 @@ Ways::Ways(const Problem& problem) : problem_(problem), sides_(ToSize(problem.mo
 
 bool Ways::Narrow(int k) const {
   const Declaration& declaration = problem_.declaration;
+  const auto corners = problem_.domain.Corners();
+  const auto meets = [&](const Region::Side& side) {
+    const auto l = ToSize(side.variable);
+    return side.range.lower < corners.second[l] && corners.first[l] < side.range.upper;
+  };
   return std::ranges::any_of(declaration.regions, [&](const Region& region) {
-    return (region.lipschitz.row(k).array() < declaration.lipschitz.row(k).array()).any();
+    return (region.lipschitz.row(k).array() < declaration.lipschitz.row(k).array()).any() &&
+           std::ranges::all_of(region.box, meets);
   });
 }
 
@@ -164,10 +170,18 @@ std::vector<double> Divided(const std::vector<double>& ends, std::size_t parts) 
   return ticks;
 }
 
-// The most that min(p + slope (t - a), q + slope (b - t)) is for t in [x, y].
-Real Most(const Real& p, const Real& q, const Real& slope, const Real& a, const Real& b, const Real& x, const Real& y) {
-  return min(min(p + slope * (y - a), q + slope * (b - x)), Real(0.5) * (p + q + slope * (b - a)));
+// The most that min(p + (slope - less) (t - a), q + (slope + less) (b - t)) is for t in [x, y].
+Real Most(const Real& p, const Real& q, double slope, double less, const Real& a, const Real& b, const Real& x,
+          const Real& y) {
+  const Real up = Real(slope) - Real(less), down = Real(slope) + Real(less);
+  if (less >= slope) return min(p + up * (x - a), q + down * (b - x));
+  if (-less >= slope) return min(p + up * (y - a), q + down * (b - y));
+  const Real crossing = (down * p + up * q + up * down * (b - a)) / (up + down);
+  return min(min(p + up * (y - a), q + down * (b - x)), crossing);
 }
+
+// Whether rounding may have decided otherwise.
+constexpr double kNear = 0x1p-23;
 
 }  // namespace
 
@@ -186,19 +200,27 @@ Nodes::Nodes(const Ways& ways, int k) : ways_(ways), k_(k) {
     }
     if (count() <= kMostCells || parts == 1) break;
   }
+  Ways::Box domain;
+  for (std::size_t l = 0; l < lower.size(); ++l) domain.emplace_back(lower[l], upper[l]);
+  for (std::size_t a = 0; a < plane.size(); ++a) largest_slopes_[a] = ways.LargestSlope(k, plane[a], domain);
   const std::size_t nodes = axes_[0].ticks.size() * axes_[1].ticks.size();
   constexpr double kUnbounded = std::numeric_limits<double>::infinity();
   sides_.fill({std::vector<Real>(nodes, Real(kUnbounded)), std::vector<double>(nodes, kUnbounded)});
-  for (std::size_t i = 0; i < axes_[0].ticks.size(); ++i)
-    for (std::size_t j = 0; j < axes_[1].ticks.size(); ++j) {
-      const std::size_t next_i = std::min(i + 1, axes_[0].ticks.size() - 1),
-                        next_j = std::min(j + 1, axes_[1].ticks.size() - 1);
-      slopes_[0].push_back(Slope(0, {std::pair(i, next_i), std::pair(j, j)}));
-      slopes_[1].push_back(Slope(1, {std::pair(i, i), std::pair(j, next_j)}));
+  const std::size_t rows = axes_[0].ticks.size() - 1, columns = axes_[1].ticks.size() - 1;
+  const auto in_cell = [&](std::size_t a, std::size_t i, std::size_t j) {
+    return Slope(a, {std::pair(i, i + 1), std::pair(j, j + 1)});
+  };
+  // An edge lies in the cells on both sides, or the one.
+  for (std::size_t i = 0; i <= rows; ++i)
+    for (std::size_t j = 0; j <= columns; ++j) {
+      const std::size_t below = i == 0 ? 0 : i - 1, left = j == 0 ? 0 : j - 1;
+      const std::size_t above = std::min(i, rows - 1), right = std::min(j, columns - 1);
+      slopes_[0].push_back(i == rows ? 0 : std::min(in_cell(0, i, left), in_cell(0, i, right)));
+      slopes_[1].push_back(j == columns ? 0 : std::min(in_cell(1, below, j), in_cell(1, above, j)));
     }
 }
 
-// Over the box between these ticks, which may be an edge.
+// Over the box between these ticks.
 double Nodes::Slope(std::size_t axis, std::array<std::pair<std::size_t, std::size_t>, 2> ticks) const {
   if (axes_[axis].variable < 0) return 0;
   Ways::Box box(ways_.sides_.size());
@@ -270,12 +292,13 @@ void Nodes::Spread() {
   for (Side& side : sides_) Spread(side);
 }
 
-std::pair<Real, Real> Nodes::Over(std::span<const Real> box) const {
-  std::array<Real, 2> lower, upper;
+std::pair<Real, Real> Nodes::Over(std::span<const Real> box, const Slopes& slopes, std::span<const Real> center) const {
+  std::array<Real, 2> lower, upper, middle;
   std::array<std::pair<std::size_t, std::size_t>, 2> strips{};
   for (std::size_t a = 0; a < 2; ++a) {
     const auto& [variable, ticks] = axes_[a];
     if (variable < 0) continue;
+    middle[a] = center[ToSize(variable)];
     lower[a] = max(Real(ticks.front()), box[ToSize(variable)].lower());
     upper[a] = min(Real(ticks.back()), box[ToSize(variable)].upper());
     for (std::size_t i = 0; i + 1 < ticks.size(); ++i) {
@@ -289,18 +312,50 @@ std::pair<Real, Real> Nodes::Over(std::span<const Real> box) const {
   for (std::size_t i = strips[0].first; i <= strips[0].second; ++i)
     for (std::size_t j = strips[1].first; j <= strips[1].second; ++j) {
       const std::array<std::pair<std::size_t, std::size_t>, 2> cell{std::pair(i, i + 1), std::pair(j, j + 1)};
-      const Real first(Slope(0, cell)), second(Slope(1, cell));
+      const double first = Slope(0, cell), second = Slope(1, cell);
       const Real a(axes_[0].ticks[i]), b(axes_[0].ticks[i + 1]), c(axes_[1].ticks[j]), d(axes_[1].ticks[j + 1]);
       for (std::size_t s = 0; s < 2; ++s) {
-        const auto along = [&](std::size_t end) {
-          return Most(sides_[s].values[i * stride + j + end], sides_[s].values[(i + 1) * stride + j + end], first, a, b,
-                      max(lower[0], a), min(upper[0], b));
+        const double sign = s == 0 ? 1 : -1;
+        const auto value = [&](std::size_t m, std::size_t n) {
+          return sides_[s].values[(i + m) * stride + j + n] -
+                 Real(sign) * (Real(slopes[0]) * ((m == 0 ? a : b) - middle[0]) +
+                               Real(slopes[1]) * ((n == 0 ? c : d) - middle[1]));
         };
-        const Real here = Most(along(0), along(1), second, c, d, max(lower[1], c), min(upper[1], d));
+        const auto along = [&](std::size_t end) {
+          return Most(value(0, end), value(1, end), first, sign * slopes[0], a, b, max(lower[0], a), min(upper[0], b));
+        };
+        const Real here = Most(along(0), along(1), second, sign * slopes[1], c, d, max(lower[1], c), min(upper[1], d));
         most[s] = most[s] ? max(*most[s], here) : here;
       }
     }
   return {-*most[1], *most[0]};
+}
+
+// By how much the middle of the bounds rises between two points, in 256ths of the largest slope.
+std::optional<Nodes::Slopes> Nodes::SlopesOver(std::span<const Real> center, std::span<const Real> half_width) const {
+  Slopes slopes{};
+  for (std::size_t a = 0; a < 2; ++a) {
+    const auto& [variable, ticks] = axes_[a];
+    const double range = ticks.back() - ticks.front(), part = largest_slopes_[a] / 256;
+    if (!(part > 0) || !(largest_slopes_[a] * range < 0x1p900)) continue;
+    const auto l = ToSize(variable);
+    const double width = 2 * half_width[l].ToDouble(), least = range / static_cast<double>(ticks.size() - 1) * 0.31;
+    if (std::abs(width - least) <= kNear * least) return std::nullopt;
+    if (!(width > least)) continue;
+    const Real away = Real(0.83) * half_width[l];
+    const auto middle_at = [&](const Real& place) {
+      std::vector<Real> at(center.begin(), center.end());
+      at[l] = place;
+      const auto [lower, upper] = Over(at, {}, center);
+      return Real(0.5) * (lower + upper);
+    };
+    const Real rise = middle_at(center[l] + away) - middle_at(center[l] - away);
+    const double parts = (rise / (Real(2.0) * away)).ToDouble() / part;
+    if (!rise.IsFinite() || !std::isfinite(parts)) continue;
+    if (std::abs(parts) < 256 && std::abs(std::abs(parts - std::floor(parts)) - 0.5) < kNear) return std::nullopt;
+    slopes[a] = part * std::clamp(std::round(parts), -256.0, 256.0);
+  }
+  return slopes;
 }
 
 }  // namespace forereach::verifier

@@ -9,6 +9,7 @@ again with slopes from the regions themselves. */
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -25,7 +26,7 @@ class Ways final {
   /** @param problem must outlive this object. */
   explicit Ways(const Problem& problem);
 
-  /** Whether some region has slopes below L in row k. */
+  /** Whether some region that the domain's inside meets has slopes below L in row k. */
   [[nodiscard]] bool Narrow(int k) const;
 
   /** The cost of the cheapest way found in row k, of a Number that is double, rounded, or Real. Along the way, what has
@@ -69,8 +70,14 @@ class Nodes final {
   void Add(const Eigen::VectorXd& z, const Real& lower, const Real& upper);
   void Spread();
 
-  /** The least and the largest that r_k can be over a box of ranges of all variables. */
-  [[nodiscard]] std::pair<Real, Real> Over(std::span<const Real> box) const;
+  /** Along the plane's variables. */
+  using Slopes = std::array<double, 2>;
+  /** The least and the largest that r_k(z) - sum of slope (z - center) can be over a box; box and center are ranges of
+  all variables. */
+  [[nodiscard]] std::pair<Real, Real> Over(std::span<const Real> box, const Slopes& slopes,
+                                           std::span<const Real> center) const;
+  /** The certifier's choice of slopes (soundness 3.20), which claims nothing; none if rounding may have decided it. */
+  [[nodiscard]] std::optional<Slopes> SlopesOver(std::span<const Real> center, std::span<const Real> half_width) const;
 
  private:
   struct Axis {
@@ -94,6 +101,7 @@ class Nodes final {
   int k_;
   std::array<Axis, 2> axes_;
   std::array<std::vector<double>, 2> slopes_;  // by axis and node: along the edge to the next node
+  std::array<double, 2> largest_slopes_{};     // by axis, over the domain
   std::array<Side, 2> sides_;
 };
 

@@ -175,18 +175,24 @@ FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const Step
   const int n = slice.dim();
   for (int k = 0; k < n; ++k) {
     const auto& slope = bounds.slope[ToSize(k)];
+    std::array<int, kMaxStates> columns;
+    std::size_t count = 0;
+    for (int l = 0; l < n; ++l)
+      if (slope[ToSize(l)] != 0) columns[count++] = l;
+    if (count == 0) continue;
+    const std::span<const int> sloped(columns.data(), count);
     double* row = ArraysOf(next).mutable_row(k);
     double magnitude = 0, slack = next.slack(k), spread = 0;
     for (int j = 0; j < slice.num_generators(); ++j) {
       magnitude = AddUp(magnitude, std::abs(row[j]));
-      for (int l = 0; l < n; ++l) {
+      for (const int l : sloped) {
         const double part = slope[ToSize(l)] * slice.generator(l, j);
         magnitude = AddUp(magnitude, NextUp(std::abs(part)));
         row[j] += part;
       }
       spread += std::abs(row[j]);
     }
-    for (int l = 0; l < n; ++l) slack = AddUp(slack, MulUp(std::abs(slope[ToSize(l)]), slice.slack(l)));
+    for (const int l : sloped) slack = AddUp(slack, MulUp(std::abs(slope[ToSize(l)]), slice.slack(l)));
     ArraysOf(next).mutable_slack(k) = AddUp(slack, PlainErrorUpper(magnitude, n + 2, n * slice.num_generators()));
     sums.row[ToSize(k)] = spread;
   }

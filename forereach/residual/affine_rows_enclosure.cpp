@@ -67,8 +67,8 @@ void AffineRowsEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds)
   others_.Enclose(query, bounds);
   const auto n = ToSize(query.slice.dim());
   const std::vector<int>&rows = declaration_.affine.rows, &columns = declaration_.affine.columns;
+  for (std::size_t k = 0; k < n && !bounds.has_slope; ++k) std::fill_n(bounds.slope[k].begin(), n, 0.0);
   bounds.has_slope = true;
-  for (std::size_t k = 0; k < n; ++k) std::fill_n(bounds.slope[k].begin(), n, 0.0);
   std::array<double, AffineRows::kMaxColumns + 1> phi;
   phi[columns.size()] = 1;
   for (std::size_t j = 0; j < columns.size(); ++j) {

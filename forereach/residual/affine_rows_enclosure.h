@@ -21,8 +21,9 @@ namespace forereach {
 
 class AffineRowsEnclosure final : public ResidualEnclosure {
  public:
-  /** @param others bounds all rows, and sets no slope; it must outlive this object. @param domain_lower, domain_upper
-  as of LipschitzEnvelope. @pre declaration.Validate passed. Cost: AffineSet::Derive for each affine row. */
+  /** @param others bounds all rows, and sets no slope of an affine one; it must outlive this object. @param
+  domain_lower, domain_upper as of LipschitzEnvelope. @pre declaration.Validate passed. Cost: AffineSet::Derive for each
+  affine row. */
   AffineRowsEnclosure(const Declaration& declaration, const Observations& observations,
                       std::span<const double> domain_lower, std::span<const double> domain_upper,
                       const ResidualEnclosure& others);

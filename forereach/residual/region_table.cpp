@@ -10,6 +10,11 @@
 namespace forereach {
 namespace {
 
+// Sums of what a tilt changes are far from the largest double.
+constexpr double kLargestTilt = 0x1p900;
+// Of a tilt; numbers that no plan, domain or region is likely to have in its own. The verifier has the same.
+constexpr double kSlopes = 256, kSecant = 0.83, kLeastStrips = 0.31;
+
 // Along an axis: its ends, all cuts, and even parts between them, at most 1 / parts of the whole way long.
 std::vector<double> TicksOf(double lower, double upper, const std::vector<double>& cuts, std::size_t parts) {
   std::vector<double> ends{lower}, ticks;
@@ -28,9 +33,15 @@ std::vector<double> TicksOf(double lower, double upper, const std::vector<double
   return ticks;
 }
 
-// The largest value on [x, y] of min(p + slope (t - a), q + slope (b - t)), p and q at the ends of a cell's side.
-double Tent(double p, double q, double slope, double a, double b, double x, double y) noexcept {
-  return std::min({p + slope * (y - a), q + slope * (b - x), p * 0.5 + q * 0.5 + slope * (b - a) * 0.5});
+// The largest value on [x, y] of min(p + up (t - a), q + down (b - t)), p and q at the ends of a cell's side. NaN in
+// one of the terms behind the first leaves the others; in the first, it is the answer.
+double Tent(double p, double q, double up, double down, double a, double b, double x, double y) noexcept {
+  const double rising = p + up * ((up > 0 ? y : x) - a), falling = q + down * (b - (down > 0 ? x : y));
+  if (!(up > 0 && down > 0)) return std::min(rising, falling);
+  // Any share would do; with this one both terms are the same.
+  const double share = up == down ? 0.5 : down / (up + down);
+  const double crossing = share * p + (1 - share) * q + std::max(share * up, (1 - share) * down) * (b - a);
+  return std::min(std::min(rising, falling), crossing);
 }
 
 }  // namespace
@@ -65,6 +76,12 @@ RegionTable::RegionTable(const RegionGrid& grid, std::size_t row, std::span<cons
         largest_way_ = std::max(largest_way_, MulUp(slope, SubUp(axes_[a].ticks[at[a] + 1], axes_[a].ticks[at[a]])));
       }
     }
+  for (std::size_t a = 0; a < variables.size(); ++a) {
+    Axis& axis = axes_[a];
+    const double width = axis.ticks.back() - axis.ticks.front(), largest = std::ranges::max(axis.slopes);
+    axis.quantum = largest * width < kLargestTilt ? largest / kSlopes : 0;
+    axis.least_width = width / static_cast<double>(axis.ticks.size() - 1) * kLeastStrips;
+  }
   for (std::vector<double>& values : values_) values.assign(axes_[0].ticks.size() * axes_[1].ticks.size(), kInfinity);
 }
 
@@ -147,30 +164,63 @@ void RegionTable::Add(std::span<const double> z, double floor, double ceiling) {
 
 // In the part of cell (i, j): along the first axis at both ends of the second, then along the second.
 double RegionTable::LargestIn(const std::vector<double>& values, std::size_t i, std::size_t j, const Part& first,
-                              const Part& second) const noexcept {
-  const double *near = &values[NodeAt(i, j)], *far = &values[NodeAt(i + 1, j)];
+                              const Part& second, const Tilt& tilt) const noexcept {
   const double *p = &axes_[0].ticks[i], *q = &axes_[1].ticks[j];
   const double lower = std::max(first.lower, p[0]), upper = std::min(first.upper, p[1]);
-  const double slope = axes_[0].slopes[CellAt(i, j)];
-  const double begin = Tent(near[0], far[0], slope, p[0], p[1], lower, upper),
-               end = Tent(near[1], far[1], slope, p[0], p[1], lower, upper);
-  return Tent(begin, end, axes_[1].slopes[CellAt(i, j)], q[0], q[1], std::max(second.lower, q[0]),
+  const std::array<double, 2>&slope = tilt.slope, &center = tilt.center;
+  const auto value = [&](std::size_t m, std::size_t n) {
+    return values[NodeAt(i + m, j + n)] - (slope[0] * (p[m] - center[0]) + slope[1] * (q[n] - center[1]));
+  };
+  const double across = axes_[0].slopes[CellAt(i, j)], along = axes_[1].slopes[CellAt(i, j)];
+  const auto largest = [&](std::size_t n) {
+    return Tent(value(0, n), value(1, n), across - slope[0], across + slope[0], p[0], p[1], lower, upper);
+  };
+  return Tent(largest(0), largest(1), along - slope[1], along + slope[1], q[0], q[1], std::max(second.lower, q[0]),
               std::min(second.upper, q[1]));
 }
 
-Interval RegionTable::Enclose(const RegionGrid::Box& box) const noexcept {
+Interval RegionTable::Enclose(const RegionGrid::Box& box, const Tilt& tilt) const noexcept {
   std::array<Part, 2> part;
   for (std::size_t a = 0; a < 2; ++a)
     if (!Cover(axes_[a], box, part[a])) return Interval::Entire();
+  const Tilt opposite{{-tilt.slope[0], -tilt.slope[1]}, tilt.center};
   std::array<double, 2> largest{-kInfinity, -kInfinity};
   for (std::size_t i = part[0].first; i <= part[0].last; ++i)
     for (std::size_t j = part[1].first; j <= part[1].last; ++j)
       for (std::size_t side = 0; side < 2; ++side) {
-        const double here = LargestIn(values_[side], i, j, part[0], part[1]);
+        const double here = LargestIn(values_[side], i, j, part[0], part[1], side == 0 ? tilt : opposite);
         largest[side] =
             std::max(largest[side], here < kInfinity ? here : kInfinity);  // what is no number bounds nothing
       }
-  return {-AddUp(largest[1], error_), AddUp(largest[0], error_)};
+  double error = error_;
+  for (std::size_t a = 0; a < 2; ++a) {
+    const double width = axes_[a].ticks.back() - axes_[a].ticks.front();
+    error = AddUp(error, MulUp(64 * kUnitRoundoff, MulUp(std::abs(tilt.slope[a]), width)));
+  }
+  return {-AddUp(largest[1], error), AddUp(largest[0], error)};
+}
+
+RegionTable::Tilt RegionTable::TiltOver(const RegionGrid::Box& box, std::span<const double> center) const noexcept {
+  Tilt tilt{};
+  RegionGrid::Box at;
+  for (const Axis& axis : axes_)
+    if (const auto l = ToSize(axis.variable); axis.variable >= 0) at.lower[l] = at.upper[l] = center[l];
+  for (std::size_t a = 0; a < 2; ++a) {
+    const auto& [variable, ticks, slopes, quantum, least_width] = axes_[a];
+    const auto l = ToSize(variable);
+    if (!(quantum > 0 && box.upper[l] - box.lower[l] > least_width)) continue;
+    tilt.center[a] = center[l];
+    const double away = kSecant * 0.5 * (box.upper[l] - box.lower[l]);
+    const auto middle_at = [&](double z) {
+      at.lower[l] = at.upper[l] = z;
+      const Interval bounds = Enclose(at);
+      return 0.5 * bounds.lower + 0.5 * bounds.upper;
+    };
+    const double secant = (middle_at(center[l] + away) - middle_at(center[l] - away)) / (2 * away);
+    at.lower[l] = at.upper[l] = center[l];
+    if (std::isfinite(secant)) tilt.slope[a] = quantum * std::clamp(std::round(secant / quantum), -kSlopes, kSlopes);
+  }
+  return tilt;
 }
 
 }  // namespace forereach

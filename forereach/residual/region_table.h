@@ -5,7 +5,8 @@ bounded: bounds at the nodes of a grid, whose ticks are all sides of regions in 
 
 A way goes from z_i to a corner of its cell of the grid, then along edges, which cost their length times the lesser
 slope of the cells on both sides. It may go around a corner of a steep region, which the moves of RegionGrid::CostUpper
-do not, and over a box the tightest observation may be another one at each of its points.
+do not, and over a box the tightest observation may be another one at each of its points. So bounds may rise or fall
+across a box, by more than they lie apart: then they are tighter relative to a slope.
 
 Rounding (docs/soundness.md, 3.20). Bounds at nodes are rounded up. A query runs in plain arithmetic, with the error of
 its expressions added at the end. */
@@ -38,15 +39,27 @@ class RegionTable final {
   node whose bound it narrows. */
   void Add(std::span<const double> z, double floor, double ceiling);
 
-  /** Bounds on r_k at every z in the box and the domain. No heap, lock or exception. Cost: some 20 ns for each cell
-  that the box meets. */
-  [[nodiscard]] Interval Enclose(const RegionGrid::Box& box) const noexcept;
+  /** A slope along the axes, of RegionGrid::variables(), and where it is zero. */
+  struct Tilt {
+    std::array<double, 2> slope, center;
+  };
+
+  /** Bounds on r_k(z) - sum_a slope_a (z_a - center_a) at every z in the box and the domain. No heap, lock or
+  exception. Cost: some 20 ns for each cell that the box meets. @pre the tilt is zero or that of a box in the domain. */
+  [[nodiscard]] Interval Enclose(const RegionGrid::Box& box, const Tilt& tilt = {}) const noexcept;
+
+  /** By how much the middle of the bounds rises across the box, along each of its sides that is not far shorter than a
+  strip: whole 256ths of the largest slope, so that who derives it again gets the same. @param center of the box, of all
+  variables of z. Any other slope were as sound. Cost: four times Enclose of a point. */
+  [[nodiscard]] Tilt TiltOver(const RegionGrid::Box& box, std::span<const double> center) const noexcept;
 
  private:
   struct Axis {
     int variable = -1;  // -1: none, and a single strip without width
     std::vector<double> ticks = {0, 0};
     std::vector<double> slopes{};  // by cell
+    double quantum = 0;            // of a tilt; 0: there is none
+    double least_width = 0;        // of a box for a tilt
   };
   // The part of a box that lies between the ticks, and the strips that cover it.
   struct Part {
@@ -59,7 +72,7 @@ class RegionTable final {
   [[nodiscard]] std::size_t NodeAt(std::size_t i, std::size_t j) const { return i * axes_[1].ticks.size() + j; }
   [[nodiscard]] double Cost(std::size_t a, std::size_t i, std::size_t j) const;
   [[nodiscard]] double LargestIn(const std::vector<double>& values, std::size_t i, std::size_t j, const Part& first,
-                                 const Part& second) const noexcept;
+                                 const Part& second, const Tilt& tilt) const noexcept;
   struct Reached {
     double value;
     std::uint32_t node;

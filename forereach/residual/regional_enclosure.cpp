@@ -9,6 +9,10 @@
 namespace forereach {
 namespace {
 
+// Bounds relative to a slope are taken if they and this share of what it changes over the slice are narrower than the
+// others. The verifier has the same.
+constexpr double kOfSlope = 0.53;
+
 std::span<const double> EntriesOfRow(const Eigen::VectorXd& entries) {
   return {entries.data(), ToSize(entries.size())};
 }
@@ -143,6 +147,35 @@ void RegionalEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds) c
     // After the observations, so that a declared bound cuts them, too (soundness 3.20).
     bounds.lower[k] = std::max(bounds.lower[k], -bound);
     bounds.upper[k] = std::min(bounds.upper[k], bound);
+  }
+  Tilt(query, hull, bounds);
+}
+
+// Relative to a slope where that is much narrower.
+void RegionalEnclosure::Tilt(const QuerySet& query, const RegionGrid::Box& hull,
+                             ResidualBounds& bounds) const noexcept {
+  const auto n = ToSize(query.slice.dim());
+  std::array<double, kMaxVariables> center;
+  for (std::size_t l = 0; l < n; ++l) center[l] = query.slice.center(static_cast<int>(l));
+  std::ranges::copy(query.input, center.begin() + static_cast<std::ptrdiff_t>(n));
+  for (std::size_t i = 0; i < grid_.rows().size(); ++i) {
+    if (!tables_[i]) continue;
+    const auto k = ToSize(grid_.rows()[i]);
+    const RegionTable::Tilt tilt = tables_[i]->TiltOver(hull, center);
+    if (tilt.slope[0] == 0 && tilt.slope[1] == 0) continue;
+    const Interval band = tables_[i]->Enclose(hull, tilt);
+    double width = band.upper - band.lower;
+    for (std::size_t a = 0; a < grid_.variables().size(); ++a)
+      if (tilt.slope[a] != 0)
+        width += kOfSlope * 2 * std::abs(tilt.slope[a]) * query.half_width[ToSize(grid_.variables()[a])];
+    if (!(width < bounds.upper[k] - bounds.lower[k])) continue;
+    if (!bounds.has_slope)
+      for (std::size_t row = 0; row < n; ++row) std::fill_n(bounds.slope[row].begin(), n, 0.0);
+    bounds.has_slope = true;
+    bounds.lower[k] = band.lower;
+    bounds.upper[k] = band.upper;
+    for (std::size_t a = 0; a < grid_.variables().size(); ++a)
+      if (tilt.slope[a] != 0) bounds.slope[k][ToSize(grid_.variables()[a])] = tilt.slope[a];
   }
 }
 

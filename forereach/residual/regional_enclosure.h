@@ -1,9 +1,9 @@
 /** The enclosure of a residual that changes less in some regions of the domain (Declaration::regions):
     max_i [r~_ik - eps_k - D_i(z)] <= r_k(z) <= min_i [r~_ik + eps_k + D_i(z)]   for every z in the hull of Z,
 with D_i(z) the cost of a path from observation i. A row that a table fits (region_table.h) looks up the largest of
-these bounds over the hull; another takes for D_i the largest cost over it (RegionGrid::CostUpper). They are intersected
-with the bounds on |r_k| of the regions that the hull meets, and with those of another enclosure, which knows L alone:
-that sees the zonotope, this one its hull.
+these bounds over the hull, and takes them relative to a slope where they are narrower so; another takes for D_i the
+largest cost over it (RegionGrid::CostUpper). They are intersected with the bounds on |r_k| of the regions that the hull
+meets, and with those of another enclosure, which knows L alone: that sees the zonotope, this one its hull.
 
 Work. Any subset of the observations gives sound bounds. Tables know each that is added. Kept for the rest, and for
 contradictions, are those that narrow a bound at their own location when they are added, and of these the last
@@ -59,6 +59,7 @@ class RegionalEnclosure final : public ResidualEnclosure {
   };
 
   void AddTested(Kept one, std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
+  void Tilt(const QuerySet& query, const RegionGrid::Box& hull, ResidualBounds& bounds) const noexcept;
   [[nodiscard]] Interval Bound(std::size_t row, const RegionGrid::Box& to, Interval bounds) const noexcept;
   void Test(const Kept& one);
   void TestBounds(int id, const RegionGrid::Box& at, std::span<const double> lower, std::span<const double> upper);

@@ -54,7 +54,7 @@ RegionalFunction<Rational> AnyTruth(Random& random, const Scene& scene) {
 }
 
 TEST(RegionsOracle, EveryResidualWithinTheRegionsLiesWithinTheBounds) {
-  int narrower = 0, touched = 0;
+  int narrower = 0, touched = 0, sloped = 0;
   for (TracedRandom random(2101); random.Again(400);) {
     SCOPED_TRACE("trial " + std::to_string(random.trial()));
     Scene scene = AnyScene(random);
@@ -87,13 +87,16 @@ TEST(RegionsOracle, EveryResidualWithinTheRegionsLiesWithinTheBounds) {
       regional.Enclose({slice, {}, {width.data(), static_cast<std::size_t>(d)}}, bounds);
       everywhere.Enclose({slice, {}, {width.data(), static_cast<std::size_t>(d)}}, wide);
       ASSERT_LE(bounds.lower[0], bounds.upper[0]);
+      sloped += bounds.has_slope;
       narrower += bounds.upper[0] - bounds.lower[0] < 0.9 * (wide.upper[0] - wide.lower[0]);
       for (int sample = 0; sample < 12; ++sample) {
         std::vector<Rational> z;
         for (int l = 0; l < d; ++l)
           z.push_back(Rational(center[l]) +
                       Rational(width[l]) * Rational(random.Coin() ? random.Sign() : random.Uniform(-1, 1)));
-        const Rational value = truth(z);
+        Rational value = truth(z);
+        for (std::size_t l = 0; l < z.size() && bounds.has_slope; ++l)
+          value -= Rational(bounds.slope[0][l]) * (z[l] - Rational(center[static_cast<Eigen::Index>(l)]));
         ASSERT_TRUE(exact::Inside(value, {bounds.lower[0], bounds.upper[0]})) << "no tolerance";
         touched +=
             Rational(bounds.upper[0] - value).get_d() < 1e-12 || Rational(value - bounds.lower[0]).get_d() < 1e-12;
@@ -101,6 +104,7 @@ TEST(RegionsOracle, EveryResidualWithinTheRegionsLiesWithinTheBounds) {
     }
   }
   EXPECT_GT(narrower, 200);
+  EXPECT_GT(sloped, 20);
   EXPECT_GT(touched, 200) << "the residuals use up what is allowed";
 }
 
@@ -241,6 +245,77 @@ struct Tabled {
   RegionTable table;
 };
 
+TEST(RegionsOracle, TheTableHoldsRelativeToEverySlope) {
+  int touched = 0;
+  for (TracedRandom random(2106); random.Again(300);) {
+    SCOPED_TRACE("trial " + std::to_string(random.trial()));
+    Scene scene = AnyScene(random);
+    const auto d = static_cast<std::size_t>(scene.variables);
+    scene.observations.z = Eigen::MatrixXd(2, scene.variables);
+    for (double& at : scene.observations.z.reshaped()) at = AnyPlace(random);
+    const RegionGrid grid(scene.declaration, scene.lower, scene.upper);
+    if (grid.rows().empty() || !RegionTable::Fits(grid, 0)) continue;
+    const RegionalFunction<Rational> truth = AnyTruth(random, scene);
+    Tabled tabled(scene.declaration, kReach);
+    for (const auto z : scene.observations.z.rowwise()) {
+      const Eigen::VectorXd at = z;
+      const Rational value = truth({at.begin(), at.end()});
+      tabled.table.Add({at.data(), d}, exact::Floor(value), exact::Ceiling(value));
+    }
+    for (int query = 0; query < 10; ++query) {
+      RegionGrid::Box box;
+      RegionTable::Tilt tilt{};
+      for (std::size_t l = 0; l < d; ++l) {
+        box.lower[l] = AnyPlace(random);
+        box.upper[l] = random.Coin(0.3) ? box.lower[l] : std::max(box.lower[l], AnyPlace(random));
+      }
+      for (std::size_t a = 0; a < grid.variables().size(); ++a) {
+        const int l = grid.variables()[a];
+        const auto at = static_cast<std::size_t>(l);
+        tilt.slope[a] = random.Coin(0.3) ? random.Sign() * scene.declaration.lipschitz(0, l) : random.Uniform(-2, 2);
+        tilt.center[a] = random.Uniform(box.lower[at], box.upper[at]);
+      }
+      const Interval bounds = tabled.table.Enclose(box, tilt);
+      for (int sample = 0; sample < 12; ++sample) {
+        std::vector<Rational> z;
+        for (std::size_t l = 0; l < d; ++l) {
+          const double share = random.Coin() ? random.Below(2) : random.Uniform(0, 1);
+          z.push_back(Rational(box.lower[l]) + (Rational(box.upper[l]) - Rational(box.lower[l])) * Rational(share));
+        }
+        Rational value = truth(z);
+        for (std::size_t a = 0; a < grid.variables().size(); ++a)
+          value -=
+              Rational(tilt.slope[a]) * (z[static_cast<std::size_t>(grid.variables()[a])] - Rational(tilt.center[a]));
+        ASSERT_TRUE(exact::Inside(value, bounds)) << "no tolerance";
+        touched += Rational(bounds.upper - value).get_d() < 1e-12 || Rational(value - bounds.lower).get_d() < 1e-12;
+      }
+    }
+  }
+  EXPECT_GT(touched, 200);
+}
+
+TEST(RegionTable, TakesTheSlopeThatDataShow) {
+  Declaration declaration{Eigen::MatrixXd{{1}}, Eigen::VectorXd::Zero(1)};
+  declaration.regions = {{{{0, {-2, 0}}}, Eigen::MatrixXd::Zero(1, 1)}};
+  Tabled tabled(declaration, 2);
+  for (const double at : {0.0, 1.5}) tabled.table.Add(std::vector<double>{at}, at, at);
+  RegionGrid::Box box;
+  const auto slope_over = [&](double lower, double upper) {
+    box.lower[0] = lower, box.upper[0] = upper;
+    const std::vector<double> center{(lower + upper) / 2};
+    return tabled.table.TiltOver(box, center);
+  };
+  EXPECT_EQ(slope_over(-1.5, -1).slope[0], 0);
+  const RegionTable::Tilt tilt = slope_over(0.5, 1);
+  EXPECT_EQ(tilt.slope[0], 1);
+  const Interval band = tabled.table.Enclose(box, tilt);
+  EXPECT_LE(band.lower, 0.75);
+  EXPECT_GE(band.upper, 0.75);
+  EXPECT_LT(band.upper - band.lower, 1e-12) << "as steep as may be, from one to the other";
+  EXPECT_EQ(slope_over(0.75, 0.7505).slope[0], 0) << "too narrow";
+  EXPECT_EQ(slope_over(1.6, 2).slope[0], 0) << "as far above as below";
+}
+
 // By L it is far along x, and near along y to where x costs nothing.
 Declaration SteepAboveCalm(double scale) {
   Declaration declaration{Eigen::Matrix2d{{1, 0.25}, {0, 0}} / scale, Eigen::Vector2d::Zero()};
@@ -363,7 +438,7 @@ class RegionalContainment : public testing::TestWithParam<std::tuple<bool, bool>
 
 TEST_P(RegionalContainment, NoAdmissibleRolloutLeavesTheTube) {
   const auto [bicycle, disturbed] = GetParam();
-  int certified = 0, slices = 0, learned = 0, narrower = 0;
+  int certified = 0, slices = 0, learned = 0, narrower = 0, sloped = 0;
   for (TracedRandom random(2111 + bicycle); random.Again(40);) {
     SCOPED_TRACE("trial " + std::to_string(random.trial()));
     const auto problem = AnyRegionalProblem(random, bicycle, random.Integer(2, 7), disturbed);
@@ -380,6 +455,7 @@ TEST_P(RegionalContainment, NoAdmissibleRolloutLeavesTheTube) {
       const Decision decision = certifier->Certify(query.plan(), query.initial_set, query.obstacles, tube);
       ASSERT_NE(decision.outcome, Outcome::kFalsified);
       certified += decision.outcome == Outcome::kCertified;
+      for (int t = 0; t < tube.length(); ++t) sloped += tube.step(t).envelope.has_slope;
       static_cast<void>(without.Certify(query.plan(), query.initial_set, query.obstacles, wider));
       const int last = std::min(tube.length(), wider.length());
       for (int k = 0; k < problem->model->num_states(); ++k)
@@ -401,6 +477,7 @@ TEST_P(RegionalContainment, NoAdmissibleRolloutLeavesTheTube) {
   EXPECT_GT(slices, 500);
   EXPECT_GT(learned, 30);
   EXPECT_GT(narrower, 20);
+  EXPECT_GT(sloped, 20);
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, RegionalContainment, testing::Combine(testing::Bool(), testing::Bool()));

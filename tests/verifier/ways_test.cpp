@@ -67,7 +67,7 @@ TEST(Ways, CostWhatTheGridSays) {
 
 // The table's bounds are never tighter than those at the nodes, and no looser than rounding makes them.
 TEST(Nodes, BoundWhatTheTableSays) {
-  int compared = 0;
+  int compared = 0, sloped = 0;
   for (TracedRandom random(2124); random.Again(20);) {
     SCOPED_TRACE("trial " + std::to_string(random.trial()));
     const auto problem = AnyRegionalProblem(random, random.Coin(), 3, false);
@@ -75,13 +75,6 @@ TEST(Nodes, BoundWhatTheTableSays) {
     const std::vector<double>&lower = corners.first, &upper = corners.second;
     const RegionGrid grid(problem->declaration, lower, upper);
     const Ways ways(*problem);
-    // Where a region begins at the domain's end, its slopes hold along that; the table has no cell there.
-    const bool touches = std::ranges::any_of(problem->declaration.regions, [&](const Region& region) {
-      return std::ranges::any_of(region.box, [&](const Region::Side& side) {
-        const auto l = static_cast<std::size_t>(side.variable);
-        return side.range.lower == upper[l] || side.range.upper == lower[l];
-      });
-    });
     for (std::size_t i = 0; i < grid.rows().size(); ++i) {
       ASSERT_EQ(RegionTable::Fits(grid, i), !ways.Plane(grid.rows()[i]).empty());
       if (!RegionTable::Fits(grid, i)) continue;
@@ -96,17 +89,30 @@ TEST(Nodes, BoundWhatTheTableSays) {
       nodes.Spread();
       for (int query = 0; query < 5; ++query) {
         RegionGrid::Box box;
-        std::vector<Real> ranges;
+        std::vector<Real> ranges, center, half_width;
+        std::vector<double> middle;
         for (std::size_t l = 0; l < lower.size(); ++l) {
           box.lower[l] = random.Coin(0.3) ? random.Integer(-2, 2) * upper[l] / 2 : random.Uniform(lower[l], upper[l]);
           box.upper[l] = random.Coin(0.3) ? box.lower[l] : random.Uniform(box.lower[l], upper[l]);
           ranges.push_back(Real::FromTo(box.lower[l], box.upper[l]));
+          middle.push_back(box.lower[l] / 2 + box.upper[l] / 2);
+          center.emplace_back(middle[l]);
+          half_width.push_back(Real(0.5) * (Real(box.upper[l]) - Real(box.lower[l])));
         }
         const Interval bounds = table.Enclose(box);
-        const auto [least, most] = nodes.Over(ranges);
+        const auto [least, most] = nodes.Over(ranges, {}, ranges);
         EXPECT_TRUE(CertainlyAtMost(Real(bounds.lower), least));
         EXPECT_TRUE(CertainlyAtMost(most, Real(bounds.upper)));
-        if (touches) continue;
+        const RegionTable::Tilt tilt = table.TiltOver(box, middle);
+        const Interval band = table.Enclose(box, tilt);
+        const auto [least_above, most_above] = nodes.Over(ranges, tilt.slope, center);
+        EXPECT_TRUE(CertainlyAtMost(Real(band.lower), least_above));
+        EXPECT_TRUE(CertainlyAtMost(most_above, Real(band.upper)));
+        EXPECT_NEAR(band.lower, least_above.ToDouble(), 1e-13);
+        EXPECT_NEAR(band.upper, most_above.ToDouble(), 1e-13);
+        const auto slopes = nodes.SlopesOver(center, half_width);
+        EXPECT_TRUE(!slopes || *slopes == tilt.slope);
+        sloped += slopes && *slopes != Nodes::Slopes{};
         EXPECT_NEAR(bounds.lower, least.ToDouble(), 1e-13);
         EXPECT_NEAR(bounds.upper, most.ToDouble(), 1e-13);
         ++compared;
@@ -114,6 +120,7 @@ TEST(Nodes, BoundWhatTheTableSays) {
     }
   }
   EXPECT_GT(compared, 30);
+  EXPECT_GT(sloped, 10);
 }
 
 }  // namespace forereach::verifier::ways_test
