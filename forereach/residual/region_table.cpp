@@ -204,11 +204,13 @@ RegionTable::Tilt RegionTable::TiltOver(const RegionGrid::Box& box, std::span<co
   Tilt tilt{};
   RegionGrid::Box at;
   for (const Axis& axis : axes_)
-    if (const auto l = ToSize(axis.variable); axis.variable >= 0) at.lower[l] = at.upper[l] = center[l];
+    if (axis.variable >= 0)
+      at.lower[ToSize(axis.variable)] = at.upper[ToSize(axis.variable)] = center[ToSize(axis.variable)];
   for (std::size_t a = 0; a < 2; ++a) {
     const auto& [variable, ticks, slopes, quantum, least_width] = axes_[a];
+    if (!(quantum > 0)) continue;
     const auto l = ToSize(variable);
-    if (!(quantum > 0 && box.upper[l] - box.lower[l] > least_width)) continue;
+    if (!(box.upper[l] - box.lower[l] > least_width)) continue;
     tilt.center[a] = center[l];
     const double away = kSecant * 0.5 * (box.upper[l] - box.lower[l]);
     const auto middle_at = [&](double z) {
