@@ -207,9 +207,12 @@ Nodes::Nodes(const Ways& ways, int k) : ways_(ways), k_(k) {
   constexpr double kUnbounded = std::numeric_limits<double>::infinity();
   sides_.fill({std::vector<Real>(nodes, Real(kUnbounded)), std::vector<double>(nodes, kUnbounded)});
   const std::size_t rows = axes_[0].ticks.size() - 1, columns = axes_[1].ticks.size() - 1;
-  const auto in_cell = [&](std::size_t a, std::size_t i, std::size_t j) {
-    return Slope(a, {std::pair(i, i + 1), std::pair(j, j + 1)});
-  };
+  std::array<std::vector<double>, 2> cells;
+  for (std::size_t a = 0; a < 2; ++a)
+    for (std::size_t i = 0; i < rows; ++i)
+      for (std::size_t j = 0; j < columns; ++j)
+        cells[a].push_back(Slope(a, {std::pair(i, i + 1), std::pair(j, j + 1)}));
+  const auto in_cell = [&](std::size_t a, std::size_t i, std::size_t j) { return cells[a][i * columns + j]; };
   // An edge lies in the cells on both sides, or the one.
   for (std::size_t i = 0; i <= rows; ++i)
     for (std::size_t j = 0; j <= columns; ++j) {
