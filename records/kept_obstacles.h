@@ -24,8 +24,7 @@ class KeptObstacles final {
   void Add(std::span<const Obstacle> set) {
     Count(set, true);
     newest_ = set.size();
-    for (const Obstacle& obstacle : set)
-      if (obstacle.grid()) newest_ += obstacle.convex().size();
+    for (const Obstacle& obstacle : set) newest_ += obstacle.grid() ? obstacle.convex().size() : 0;
   }
   /** @pre it was added, and is still there. */
   void Remove(std::span<const Obstacle> set) { Count(set, false); }
