@@ -68,6 +68,7 @@ Timeline::Timeline(const Config& first, TaskFinder find, std::optional<KeyRing> 
       transition_sender_(Microseconds(first.gate.robot_timeout_ms)) {}
 
 void Timeline::Read(const std::vector<std::string>& logs, bool names_files) {
+  if (!has_begun_) Start();
   damage_ += ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) {
     const std::string file = names_files ? std::filesystem::path(log).filename().string() + " " : "";
     Take(event, fmt::format("{}event {}", file, event.number));
