@@ -1328,7 +1328,7 @@ void TubeMaker::Tilt(const Query& query, int k, const KnownRows& rows, Known& kn
   Real width = upper - lower;
   for (std::size_t a = 0; a < variables.size(); ++a)
     width += Real(0.53) * Real(2.0) * abs(Real((*slopes)[a])) * query.half_width[ToSize(variables[a])];
-  const double least = (known.bounds.upper - known.bounds.lower).ToDouble(), much = width.ToDouble();
+  const double least = 0.999 * (known.bounds.upper - known.bounds.lower).ToDouble(), much = width.ToDouble();
   known.is_tie = std::abs(much - least) <= 0x1p-30 * std::abs(least);
   if (!(much < least)) return;
   known.bounds = {lower, upper};

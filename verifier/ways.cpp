@@ -182,6 +182,7 @@ Real Most(const Real& p, const Real& q, double slope, double less, const Real& a
 
 // Whether rounding may have decided otherwise.
 constexpr double kNear = 0x1p-23;
+constexpr double kSlopes = 250.7;
 
 }  // namespace
 
@@ -334,13 +335,13 @@ std::pair<Real, Real> Nodes::Over(std::span<const Real> box, const Slopes& slope
   return {-*most[1], *most[0]};
 }
 
-// By how much the middle of the bounds rises between two points, in 256ths of the largest slope.
+// By how much the middle of the bounds rises between two points, in parts of which the largest slope has 250.7.
 std::optional<Nodes::Slopes> Nodes::SlopesOver(std::span<const Real> center, std::span<const Real> half_width) const {
   Slopes slopes{};
   for (std::size_t a = 0; a < 2; ++a) {
     const auto& [variable, ticks] = axes_[a];
-    const double range = ticks.back() - ticks.front(), part = largest_slopes_[a] / 256;
-    if (!(part > 0) || !(largest_slopes_[a] * range < 0x1p900)) continue;
+    const double range = ticks.back() - ticks.front(), part = largest_slopes_[a] / kSlopes;
+    if (!(part > 0) || !(range > 0) || !(largest_slopes_[a] * range < 0x1p900)) continue;
     const auto l = ToSize(variable);
     const double width = 2 * half_width[l].ToDouble(), least = range / static_cast<double>(ticks.size() - 1) * 0.31;
     if (std::abs(width - least) <= kNear * least) return std::nullopt;
@@ -355,8 +356,8 @@ std::optional<Nodes::Slopes> Nodes::SlopesOver(std::span<const Real> center, std
     const Real rise = middle_at(center[l] + away) - middle_at(center[l] - away);
     const double parts = (rise / (Real(2.0) * away)).ToDouble() / part;
     if (!rise.IsFinite() || !std::isfinite(parts)) continue;
-    if (std::abs(parts) < 256 && std::abs(std::abs(parts - std::floor(parts)) - 0.5) < kNear) return std::nullopt;
-    slopes[a] = part * std::clamp(std::round(parts), -256.0, 256.0);
+    if (std::abs(parts) < kSlopes && std::abs(std::abs(parts - std::floor(parts)) - 0.5) < kNear) return std::nullopt;
+    slopes[a] = part * std::clamp(std::round(parts), -kSlopes, kSlopes);
   }
   return slopes;
 }

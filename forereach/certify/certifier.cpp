@@ -270,6 +270,16 @@ std::shared_ptr<const RegionGrid> DisturbedRegions(const Problem& problem) {
   return std::make_shared<const RegionGrid>(problem.declaration, lower, upper);
 }
 
+// The states that the slack may hold: the slope of a row ties its columns to others.
+unsigned SeparableStates(const Problem& problem, const Placement& placement) {
+  if (!problem.declaration.affine.rows.empty()) return 0;
+  unsigned states = placement.SeparableStates();
+  for (const Region& region : problem.declaration.regions)
+    for (const Region::Side& side : region.box)
+      if (side.variable < problem.model->num_states()) states &= ~(1u << side.variable);
+  return states;
+}
+
 }  // namespace
 
 Certifier::Certifier(std::shared_ptr<const Problem> problem)
@@ -282,9 +292,7 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       propagator_(*problem_->model, problem_->domain, observed_->residual(), problem_->declaration.disturbance,
                   problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing,
                   ActedInputs(problem_->declaration), problem_->declaration.growing,
-                  // The slope of an affine row ties its columns to others.
-                  problem_->declaration.affine.rows.empty() ? safety_.placement().SeparableStates() : 0,
-                  DisturbedRegions(*problem_)) {
+                  SeparableStates(*problem_, safety_.placement()), DisturbedRegions(*problem_)) {
   TestRates();
 }
 

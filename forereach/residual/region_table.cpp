@@ -13,7 +13,7 @@ namespace {
 // Sums of what a tilt changes are far from the largest double.
 constexpr double kLargestTilt = 0x1p900;
 // Of a tilt; numbers that no plan, domain or region is likely to have in its own. The verifier has the same.
-constexpr double kSlopes = 256, kSecant = 0.83, kLeastStrips = 0.31;
+constexpr double kSlopes = 250.7, kSecant = 0.83, kLeastStrips = 0.31;
 
 // Along an axis: its ends, all cuts, and even parts between them, at most 1 / parts of the whole way long.
 std::vector<double> TicksOf(double lower, double upper, const std::vector<double>& cuts, std::size_t parts) {

@@ -49,8 +49,8 @@ class RegionTable final {
   [[nodiscard]] Interval Enclose(const RegionGrid::Box& box, const Tilt& tilt = {}) const noexcept;
 
   /** By how much the middle of the bounds rises across the box, along each of its sides that is not far shorter than a
-  strip: whole 256ths of the largest slope, so that who derives it again gets the same. @param center of the box, of all
-  variables of z. Any other slope were as sound. Cost: four times Enclose of a point. */
+  strip: whole parts, of which the largest slope has 250.7, so that who derives it again gets the same. @param center of
+  the box, of all variables of z. Any other slope were as sound. Cost: four times Enclose of a point. */
   [[nodiscard]] Tilt TiltOver(const RegionGrid::Box& box, std::span<const double> center) const noexcept;
 
  private:

@@ -11,7 +11,7 @@ namespace {
 
 // Bounds relative to a slope are taken if they and this share of what it changes over the slice are narrower than the
 // others. The verifier has the same.
-constexpr double kOfSlope = 0.53;
+constexpr double kOfSlope = 0.53, kNarrower = 0.999;
 
 std::span<const double> EntriesOfRow(const Eigen::VectorXd& entries) {
   return {entries.data(), ToSize(entries.size())};
@@ -168,7 +168,7 @@ void RegionalEnclosure::Tilt(const QuerySet& query, const RegionGrid::Box& hull,
     for (std::size_t a = 0; a < grid_.variables().size(); ++a)
       if (tilt.slope[a] != 0)
         width += kOfSlope * 2 * std::abs(tilt.slope[a]) * query.half_width[ToSize(grid_.variables()[a])];
-    if (!(width < bounds.upper[k] - bounds.lower[k])) continue;
+    if (!(width < kNarrower * (bounds.upper[k] - bounds.lower[k]))) continue;
     if (!bounds.has_slope)
       for (std::size_t row = 0; row < n; ++row) std::fill_n(bounds.slope[row].begin(), n, 0.0);
     bounds.has_slope = true;

@@ -1,5 +1,8 @@
 // Models as text in task files: what they mean, and what is said of those that mean nothing.
 
+#include <fmt/format.h>
+
+#include "forereach/certify/certifier.h"
 #include "forereach/dynamics/expression.h"
 #include "task/canonical.h"
 #include "tests/task/task_files.h"
@@ -385,6 +388,44 @@ TEST_F(AnglesTest, ALimitIsTheSameAfterATurn) {
   EXPECT_EQ(Error(with("x + theta")),
             "17:31: limits: wall is not seen to be the same after a turn of the angle theta by 2 pi: write it with "
             "sin, cos or tan of it");
+}
+
+// Slopes by place tie px to the other states, so the slack may not hold its axis.
+TEST(RegionsByPlace, GiveNoWiderTubeWherePlaceIsAStateOfItsOwn) {
+  std::string steps = "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n";
+  for (int i = 0; i < 60; ++i) {
+    const double px = -2 + i / 6.0, vx = i % 7 * 0.4, vy = i % 5 * 0.4 - 0.8;
+    const double r = -0.25 * std::min(px, 0.7 + 0.3 * px) + 0.02 * std::sin(3 * px);
+    steps += fmt::format("{},0,{},{},0,0,{},{},{},{}\n", px, vx, vy, px + 0.15 * vx, 0.15 * vy, 0.9 * vx - 0.4 * vy + r,
+                         0.9 * vy + 0.4 * vx + r / 2);
+  }
+  const auto half_width = [&](const std::string& projection) {
+    const TaskFiles files;
+    const Config config = files.Load(
+        "model:\n  states: {px: m, py: m, vx: m/s, vy: m/s}\n  inputs: {ax: m/s^2, ay: m/s^2}\n  parameters: {dt: "
+        "0.15}\n"
+        "  next:\n    px: px + dt*vx\n    py: py + dt*vy\n    vx: 0.9*vx - 0.4*vy + dt*ax\n    vy: 0.9*vy + 0.4*vx + "
+        "dt*ay\n"
+        "domain:\n  state: {lower: [-200, -20, -15, -15], upper: [200, 20, 15, 15]}\n"
+        "  input: {lower: [-3, -3], upper: [3, 3]}\n"
+        "declaration:\n  lipschitz: {vx: {px: 0.4}, vy: {px: 0.2}}\n  noise_bound: [0.01, 0, 0.0001, 0.0001]\n  "
+        "regions:\n"
+        "    - {in: {px: [-200, 1]}, lipschitz: {vx: {px: 0.3101}, vy: {px: 0.1551}}}\n"
+        "    - {in: {px: [1, 200]}, lipschitz: {vx: {px: 0.1351}, vy: {px: 0.06755}}}\n"
+        "transitions: steps.csv\ntask:\n"
+        "  initial_set: {center: [0, 0, 2, 0.1], half_width: [0.005, 0.005, 0.001, 0.001]}\n  projection: " +
+            projection + "\n  obstacles: []\n  between: samples\n",
+        steps);
+    Tube tube;
+    const std::array<double, 24> controls{};
+    const Certifier certifier(config.problem);
+    EXPECT_FALSE(certifier.violation());
+    const Zonotope initial_set = Zonotope::Enclose(config.initial_set);
+    static_cast<void>(certifier.Certify({controls.data(), 2, 12, 2}, initial_set, {}, tube));
+    EXPECT_EQ(tube.length(), 12);
+    return tube.half_width(tube.length())[0];
+  };
+  EXPECT_LE(half_width("[px, py]"), 1.001 * half_width("[[1, 0, 0, 0], [1e-12, 1, 0, 0]]"));
 }
 
 // The line of the file, not the row from 0.
