@@ -158,8 +158,8 @@ class Torturer final {
     return *row_;
   }
 
-  // How an honest candidate is answered; and whether it was judged, as no attack may be. On a loaded machine the answer
-  // may be late for its start.
+  // How an honest candidate is answered; and whether it was judged, as no attack may be. A loaded gate may
+  // answer too late for the start; then another one is sent.
   std::pair<std::string, bool> AskHonestly() {
     TortureRow unused;
     row_ = &unused;

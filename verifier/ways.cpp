@@ -182,6 +182,7 @@ Real Most(const Real& p, const Real& q, double slope, double less, const Real& a
 
 // Whether rounding may have decided otherwise.
 constexpr double kNear = 0x1p-23;
+// Parts of the largest slope: a declared one is hardly ever half a part off.
 constexpr double kSlopes = 250.7;
 
 }  // namespace

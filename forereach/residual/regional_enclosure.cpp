@@ -9,8 +9,8 @@
 namespace forereach {
 namespace {
 
-// Bounds relative to a slope are taken if they and this share of what it changes over the slice are narrower than the
-// others. The verifier has the same.
+// Bounds relative to a slope are taken if they and a share of what it changes over the slice are narrower than most of
+// the others' width. The verifier has the same.
 constexpr double kOfSlope = 0.53, kNarrower = 0.999;
 
 std::span<const double> EntriesOfRow(const Eigen::VectorXd& entries) {

@@ -278,6 +278,19 @@ TEST_F(TimelineTest, TheSetsOfTheLastDecisionsAreKeptAsFarAsThereIsRoom) {
   }
 }
 
+TEST_F(TimelineTest, APlanKeepsItsGroundsOverOneRestart) {
+  Restart();
+  Transition();
+  Certify();
+  for (int i = 0; i < 2; ++i) {
+    Restart();
+    Append(config_.bus.certified, first_certified_);
+  }
+  Keeper keeper;
+  keeper.Read(config_, logs_, {});
+  EXPECT_THAT(keeper.has_grounds, ElementsAre(true, true, false));
+}
+
 TEST_F(TimelineTest, WhatTooManyMessagesFollowCountsAsReceived) {
   Restart();
   for (int i = 0; i < 12; ++i) Obstacles(60 + i), Transition();
