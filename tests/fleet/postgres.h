@@ -5,6 +5,7 @@
 
 #include <unistd.h>
 
+#include "tests/paths.h"
 #include "tests/process/child_process.h"
 #include "tests/shell.h"
 #include "tests/test.h"
@@ -34,10 +35,10 @@ class Postgres final {
     if (geteuid() == 0) {
       EXPECT_EQ(Shell("chown nobody " + folder_).code, 0);
     }
-    const Output made = Shell(AsUser() + Programs() + "initdb -D " + folder_ + "/data -U owner -A trust -N 2>&1");
+    const Output made = Shell(FOREREACH_SOURCE_DIR "/tests/fleet/server_files " + Programs() +
+                              " " FOREREACH_BINARY_DIR "/tests/fleet " + folder_ + " 2>&1");
     EXPECT_EQ(made.code, 0) << made.text;
     Start();
-    Sql("CREATE DATABASE fleet", "owner", "postgres");
   }
   ~Postgres() {
     if (server_) server_->Signal(SIGINT);
