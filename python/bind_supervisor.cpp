@@ -15,17 +15,40 @@ namespace {
 
 // A robot that is an object of Python. Its functions take Python's lock, which is free while messages come. What its
 // functions raise stops the robot and goes to sys.unraisablehook, or, what is to end the program (KeyboardInterrupt,
-// SystemExit), to the caller of the supervisor.
+// SystemExit), to the caller of the supervisor. Or it is None: the caller measures and holds.
 class PythonRobot final : public RobotClient::Robot {
  public:
   explicit PythonRobot(py::object robot) : robot_(std::move(robot)) {}
 
-  std::span<const double> state() const override { return Numbers("state", state_); }
+  // By its caller, as far as it is None: there is no other way to measure that.
+  void Measured(const py::object& state, const py::object& error, int num_states) {
+    if (state.is_none() == robot_.is_none() || (state.is_none() && !error.is_none()))
+      throw std::invalid_argument("state: has to be given to boundary if the supervisor has no robot, and only then");
+    if (state.is_none()) return;
+    const auto numbers = [&](const py::object& given, const char* name) {
+      const Eigen::VectorXd vector = VectorOf(given, name);
+      if (vector.size() != num_states)
+        throw std::invalid_argument(std::string(name) + ": " + std::to_string(vector.size()) + " entries, must have " +
+                                    std::to_string(num_states));
+      return std::vector<double>(vector.begin(), vector.end());
+    };
+    state_ = numbers(state, "state");
+    error_ = error.is_none() ? std::vector<double>() : numbers(error, "state_error");
+  }
+
+  std::span<const double> state() const override {
+    if (!robot_.is_none()) return Numbers("state", state_);
+    if (state_.empty()) throw std::runtime_error("no state was measured yet");
+    return state_;
+  }
   std::span<const double> state_error() const override {
-    return Has("state_error") ? Numbers("state_error", error_) : std::span<const double>();
+    return Has("state_error") ? Numbers("state_error", error_) : error_;
   }
   void Hold() override {
-    Call("hold", [&](const py::object& hold) { hold(); });
+    if (robot_.is_none())
+      has_to_hold_ = true;
+    else
+      Call("hold", [&](const py::object& hold) { hold(); });
   }
   int StepsToRest(std::span<const double> lower, std::span<const double> upper) const override {
     if (!Has("steps_to_rest")) return Robot::StepsToRest(lower, upper);
@@ -39,7 +62,9 @@ class PythonRobot final : public RobotClient::Robot {
     if (Has("reload")) Call("reload", [&](const py::object& reload) { reload(); });
   }
 
-  [[nodiscard]] bool is_interrupted() const { return interrupt_ != nullptr; }
+  // Whether nothing is to be waited for: its caller has to hold it, or the program ends.
+  [[nodiscard]] bool is_interrupted() const { return has_to_hold_ || interrupt_ != nullptr; }
+  void BeginWaiting() { has_to_hold_ = false; }
   void RaiseInterrupt() {
     if (interrupt_) std::rethrow_exception(std::exchange(interrupt_, nullptr));
   }
@@ -79,6 +104,7 @@ class PythonRobot final : public RobotClient::Robot {
   const py::object robot_;
   mutable std::vector<double> state_, error_;
   mutable std::exception_ptr interrupt_;
+  bool has_to_hold_ = false;
 };
 
 class BusSupervisor final {
@@ -92,10 +118,13 @@ class BusSupervisor final {
   BusSupervisor& operator=(const BusSupervisor&) = delete;
 
   void Listen(std::int64_t until_utime) {
+    robot_.BeginWaiting();
     client_.Listen(until_utime, [this] { return robot_.is_interrupted(); });
     robot_.RaiseInterrupt();
   }
-  py::object Boundary(std::int64_t utime, bool ends) {
+  py::object Boundary(std::int64_t utime, bool ends, const py::object& state, const py::object& error) {
+    static_cast<void>(client_.supervisor());  // of this thread
+    robot_.Measured(state, error, client_.problem().model->num_states());
     const py::object control = Control(client_.Boundary(utime, ends));
     robot_.RaiseInterrupt();
     return control;
@@ -133,19 +162,25 @@ void BindSupervisor(py::module_& module) {
 It is the C++ Supervisor (robot/supervisor.h), which calls `robot`: state() -> (n,), as measured last; hold(), which
 comes to rest by its own means; and, where it has them, steps_to_rest(lower, upper) -> int, state_error() -> (n,),
 reload(). An exception in one of them stops the robot and goes to sys.unraisablehook. Only the thread that made it may
-use it.)")
+use it.
+
+Without a `robot` you give each boundary its state, and come to rest by your own means where `control` is None.)")
       .def(py::init(
                [](std::shared_ptr<JudgingTask> task, py::object robot, const std::string& key, const std::string& url) {
                  return std::make_unique<BusSupervisor>(task, std::move(robot), key, url);
                }),
-           py::arg("task"), py::arg("robot"), py::arg("key") = "", py::arg("url") = "",
+           py::arg("task"), py::arg("robot") = py::none(), py::arg("key") = "", py::arg("url") = "",
            "key: the robot's key file, or a directory with it; url: of the bus. By default those of the task.")
       .def("listen", &BusSupervisor::Listen, py::arg("until_utime"),
-           "Takes plans, withdrawals, faults and commands until this time, microseconds since the Unix epoch.")
+           R"(Takes plans, withdrawals, faults and commands until this time, microseconds since the Unix epoch.
+
+Without a `robot` it returns sooner if the control ends before its step does: hold at once, and listen on.)")
       .def("boundary", &BusSupervisor::Boundary, py::arg("utime"), py::arg("ends") = false,
+           py::arg("state") = py::none(), py::arg("state_error") = py::none(),
            R"(Handles the step boundary that was due at `utime`. ends: no further plan starts.
 
-Returns the control to apply until the next one, (m,); None: hold.)")
+state: (n,), as measured last, and state_error: (n,), how far it may be off, by default the task's; both without a
+`robot` alone. Returns the control to apply until the next boundary, (m,); None: hold.)")
       .def_property_readonly("control", py::overload_cast<>(&BusSupervisor::Control),
                              "The control under way, until a stop or a withdrawal ends it; None: hold.")
       .def("expect", &BusSupervisor::Expect, py::arg("task"), "After reload(): also accepts plans under this task.")

@@ -49,6 +49,8 @@ TaskPointer MakeTask(const py::object& task, const std::string& path, const py::
   if (task.is_none() == keys.empty())
     throw std::invalid_argument("task: must be a dict or a text, or its keys by name");
   py::object whole = task.is_none() ? keys : task;
+  if (keys.contains("equations") || keys.contains("L"))
+    whole = py::module_::import("forereach._task").attr("spelled_out")(**keys);
   std::optional<Transitions> transitions;
   if (!data.is_none()) {
     const bool has_durations = py::isinstance<py::tuple>(data) && py::len(data) == 3;
@@ -221,7 +223,21 @@ py::dict Declare(const JudgingTask& task, const std::vector<std::string>& by, do
                   "warning"_a = WarningOf(held_out));
 }
 
-py::dict FitOf(const JudgingTask& task, const std::vector<std::string>& names) {
+// The observations, or the executed steps of a log. As `forereach fit`, it takes those outside the domain, too.
+Transitions StepsToFit(const JudgingTask& task, const py::object& log) {
+  if (log.is_none()) return WithoutWrappedAngle(task)->transitions;
+  const auto [z, next] = PairOf(py::module_::import("forereach._task").attr("steps_of")(log, task.config().period));
+  const Transitions steps{RowsOf(z, "log: z"), RowsOf(next, "log: x_next")};
+  const NominalModel& model = task.model();
+  if (steps.z.cols() != model.num_variables() || steps.x_next.cols() != model.num_states())
+    throw ConfigError("log: " + std::to_string(steps.x_next.cols()) + " states, and with inputs " +
+                      std::to_string(steps.z.cols()) + "; the model has " + std::to_string(model.num_states()) +
+                      " and " + std::to_string(model.num_variables()));
+  RequireNoWrappedAngle(task.config().path, "log", model, steps);
+  return steps;
+}
+
+py::dict FitOf(const JudgingTask& task, const py::object& log, const std::vector<std::string>& names) {
   const ModelText* text = task.model().text();
   if (!text)
     throw ConfigError(task.config().path + ": model: " + task.model().name() +
@@ -230,9 +246,10 @@ py::dict FitOf(const JudgingTask& task, const std::vector<std::string>& names) {
   if (names.empty())
     for (const ModelText::Parameter& parameter : text->parameters)
       if (parameter.name != "dt") those.push_back(parameter.name);
+  const Transitions steps = StepsToFit(task, log);
   const Fit fit = [&] {
     const py::gil_scoped_release release;
-    return FitParameters(*text, WithoutWrappedAngle(task)->transitions, those);
+    return FitParameters(*text, steps, those);
   }();
   using namespace py::literals;
   py::dict parameters, deviations;
@@ -313,6 +330,10 @@ Any number of threads may use one. n states, m inputs, T steps; the units are th
           py::arg("data") = py::none(),
           R"(Of a dict with the keys of a task file, the text of one, or the keys by name: Task(model={...}, domain={...}, ...).
 
+In the paper's words: Task(equations=..., domain=..., L=..., data=...). equations stands for `model`, with `states`, and L for
+`declaration.lipschitz`: names, or (n, n + m) in the states' units per those of states and inputs. Unless they are given, too,
+`declaration.noise_bound` is zero, and `task` has no obstacle: the data are exact, certificates hold at the samples.
+
 `path` names it in messages, and the files that it names are relative to the directory of `path`.
 data: (z, x_next) of observed steps, (N, n + m) and (N, n), instead of the file `transitions`, or (z, x_next, dt_error):
 step i lasted at most dt_error[i] seconds longer or shorter than dt.)")
@@ -351,9 +372,11 @@ It is judged with what the task knew when it decided.)")
 by: "v,omega" for every state, or "theta=v,omega" for one. The result has `lipschitz` (n, n + m),
 `noise_bound` and `disturbance` (n,), `yaml`, and of the task's own steps how many slices were held against steps left out, how many miss them, and a warning.)")
       .def(
-          "fit", &FitOf, py::arg("parameters") = std::vector<std::string>(),
+          "fit", &FitOf, py::arg("log") = py::none(), py::arg("parameters") = std::vector<std::string>(),
           R"(Fits the named parameters of a model as text, by default all but dt, to the observations, as `forereach fit`.
 
+log: a Log or the path of one, whose executed steps take the place of the observations: those that lasted dt, give or take
+less than half of it, each as if it had lasted dt.
 The result has `parameters`, their standard errors `deviations`, and one-step errors `before` and `after`, (N, n).)");
 }
 

@@ -97,6 +97,47 @@ class Drive(BusTest):
         self.assertEqual(inside, steps)
 
 
+class Block(BusTest):
+    """The block of Python with which this module was asked for."""
+    TEXT = """
+task = fr.Task.load("task.yaml")
+fr.Task(equations=equations, domain=domain, L=L, data=data)
+d = task.certify(U, x0=(center, half_width))
+d.outcome, d.step, d.cause, d.message, d.tube.center, d.tube.generators, d.tube.hull, d.clearance
+task.certify_many(Us)
+task.advise(d); task.declare(); task.fit(log); task.observe(z, x_next); d.plot(ax)
+fr.Log("run.lcmlog").decisions()
+bus = fr.Bus(task, key="keys/planner.key"); bus.propose(U, x0, start); bus.decisions(); bus.robot_state()
+robot = fr.Supervisor(task, key="keys/robot.key")
+"""
+
+    def test_runs_as_it_stands(self):
+        text = Path("config/bicycle_text.yaml").read_text().replace("models/", f"{Path.cwd()}/config/models/")
+        text = text.replace("data/bicycle_corridor_400.csv", "steps.csv")
+        (self.scratch / "task.yaml").write_text(text + f"bus: {{url: '{URL}'}}\n")
+        lines = Path("config/data/bicycle_corridor_400.csv").read_text().splitlines(True)
+        (self.scratch / "steps.csv").write_text("".join(lines[:60]))
+        (self.scratch / "run.lcmlog").write_bytes(Path("tests/data/course.lcmlog").read_bytes())
+        self.addCleanup(os.chdir, os.getcwd())
+        os.chdir(self.scratch)
+        half = [0.025, 0.025, 0.005, 0.025, 0.01, 0.002]
+        given = {
+            "fr": fr, "U": np.zeros((12, 2)), "center": [0, 0, 0, 12, 0, 0.3], "half_width": half, "ax": None,
+            "x0": ([0, 0, 0, 12, 0, 0.3], half), "Us": np.zeros((3, 12, 2)), "start": now() + 1_000_000,
+            "equations": {"states": {"x": "m", "v": "m/s"}, "inputs": {"a": "m/s^2"}, "parameters": {"dt": 0.1},
+                          "next": {"x": "x + dt*v", "v": "v + dt*a"}},
+            "domain": {"state": {"lower": [-9, -3], "upper": [9, 3]}, "input": {"lower": [-1], "upper": [1]}},
+            "L": [[0, 0, 0], [0, 0.02, 0]], "data": ([[0, 1, 0]], [[0.1, 0.99]]), "log": fr.Log("run.lcmlog"),
+            "z": [0, 0, 0, 12, 0, 0, 0, 0], "x_next": [1.2, 0, 0, 12, 0, 0],
+        }
+        exec(self.TEXT, given)
+        self.assertEqual(given["task"].num_observations, 60)
+        robot, bus, begin = given["robot"], given["bus"], now()
+        robot.listen(begin)
+        self.assertIsNone(robot.boundary(begin, state=given["center"]))
+        self.assertEqual(bus.robot_state(timeout=30)["state"].tolist(), given["center"])
+
+
 class Ends(BusTest):
     def supervisor(self, robot):
         return fr.Supervisor(fr.Task.load(TASK), robot, key=self.keys, url=URL)
@@ -127,6 +168,50 @@ class Ends(BusTest):
         self.assertGreater(before, 0)
         self.assertIsNone(supervisor.boundary(now()))
         self.assertEqual(supervisor.counts["errors"], before)
+
+    def test_of_a_robot_that_its_caller_measures_execute_certified_plans_and_hold_at_once(self):
+        self.start_certifier()
+        task = fr.Task.load(TASK)
+        robot, bus = fr.Supervisor(task, key=self.keys, url=URL), fr.Bus(task, key=self.keys, url=URL)
+        x, step, boundary = np.zeros(4), round(task.dt * 1e6), now()
+
+        def move():
+            if robot.control is not None:
+                x[:2] += task.dt * x[2:] + task.dt**2 / 2 * robot.control
+                x[2:] += task.dt * robot.control
+
+        proposed = boundary
+        while robot.counts["steps"] < 3:
+            robot.listen(boundary)
+            move()
+            if robot.boundary(boundary, state=x, state_error=np.zeros(4)) is None and boundary > proposed:
+                proposed = boundary + 16 * step
+                bus.propose([[0.5, 0.0]] * 8 + [[-0.5, 0.0]] * 8, (x, np.full(4, 0.01)), boundary + 8 * step)
+            boundary += step
+        robot.listen(boundary)
+        move()
+        x[2] += 1e-3  # inside the slice, and no motion of what the task declares
+        self.assertIsNotNone(robot.boundary(boundary, state=x, state_error=np.zeros(4)))
+        later = now() + 100_000_000
+        robot.listen(later)
+        self.assertLess(now(), later)
+        self.assertIsNone(robot.control)
+        self.assertTrue(robot.halted)
+        self.assertEqual(robot.counts["steps_inside"], 4)
+
+    def test_of_a_robot_without_functions_say_what_their_caller_has_to_give(self):
+        task = fr.Task.load(TASK)
+        own, other = fr.Supervisor(task, key=self.keys, url=URL), self.supervisor(Rover())
+        for words, call in [
+            ("if the supervisor has no robot, and only then", lambda: own.boundary(now())),
+            ("if the supervisor has no robot, and only then", lambda: other.boundary(now(), state=np.zeros(4))),
+            ("if the supervisor has no robot, and only then", lambda: other.boundary(now(), state_error=np.zeros(4))),
+            ("state: 3 entries, must have 4", lambda: own.boundary(now(), state=np.zeros(3))),
+            ("state_error: 5 entries, must have 4", lambda: own.boundary(now(), state=np.zeros(4), state_error=np.zeros(5))),
+            ("state: is of dtype", lambda: own.boundary(now(), state="x")),
+        ]:
+            self.assertRaisesRegex(fr.Error, words, call)
+        self.assertEqual((own.counts["boundaries"], other.counts["boundaries"]), (0, 0))
 
     def test_of_a_planner_hear_the_robots_states_and_send_only_what_fits(self):
         task = fr.Task.load(TASK)

@@ -1,5 +1,6 @@
 """Recorded runs as columns: those of `forereach export`."""
 import csv
+import json
 import os
 import shutil
 import subprocess
@@ -73,6 +74,37 @@ class Columns(unittest.TestCase):
         task = fr.Task(text, path=TASK, data=(np.hstack([state, applied])[one_step], after[one_step]))
         self.assertEqual(task.num_observations, one_step.sum())
         self.assertEqual(task.declare(by=["v,delta"])["lipschitz"].shape, (6, 8))
+
+    def test_of_executed_steps_are_fitted_as_the_command_fits_them(self):
+        text = Path("config/bicycle_text.yaml").read_text().replace("models/", f"{Path.cwd()}/config/models/")
+        text = text.replace("wheelbase: 2.5", "wheelbase: 2.3").replace("data/bicycle_corridor_400.csv", "steps.csv")
+        steps = fr.Log(LOG, config=TASK).transitions()
+        one_step = np.abs(steps["duration_us"] / 1e6 - 0.1) < 0.05
+        rows = [np.hstack([steps[name][i] for name in ["state", "input", "next_state"]]) for i in np.flatnonzero(one_step)]
+        states = ["x", "y", "theta", "v", "a", "delta"]
+        header = ",".join(states + ["jerk", "steer_rate"] + [f"{state}_next" for state in states])
+        np.savetxt(self.scratch / "steps.csv", rows, "%.17g", ",", header=header, comments="")
+        (self.scratch / "task.yaml").write_text(text)
+        command = [FOREREACH, "fit", "--json", "--config", self.scratch / "task.yaml"]
+        said = json.loads(subprocess.run(command, capture_output=True, text=True).stdout)
+        task = fr.Task(text, path=str(self.scratch / "task.yaml"), data=(np.zeros((1, 8)), np.zeros((1, 6))))
+        for log in [fr.Log(LOG, config=TASK), LOG, Path(LOG)]:
+            fit = task.fit(log)
+            self.assertEqual(fit["parameters"], {each["name"]: each["after"] for each in said["parameters"]})
+            self.assertEqual(len(fit["after"]), len(rows))
+        self.assertGreater(len(rows), 60)
+        self.assertNotEqual(fit["parameters"]["wheelbase"], 2.3)
+        self.assertEqual(task.num_observations, 1)
+        self.assertEqual(task.fit(LOG, ["wheelbase"])["parameters"], fit["parameters"])
+        other = fr.Task("".join(text).replace("dt: 0.1,", "dt: 60,"), path=str(self.scratch / "task.yaml"),
+                        data=(np.zeros((1, 8)), np.zeros((1, 6))))
+        self.assertRaisesRegex(fr.Error, "log: no executed step of 60.0 s", other.fit, LOG)
+        self.assertRaisesRegex(fr.Error, "nosuch", task.fit, "nosuch.lcmlog")
+        small = fr.Task(equations={"states": {"x": "m"}, "inputs": {"u": "m/s"}, "parameters": {"dt": 0.1, "k": 1},
+                                   "next": {"x": "x + k*dt*u"}},
+                        domain={"state": {"lower": [-9], "upper": [9]}, "input": {"lower": [-1], "upper": [1]}},
+                        L=[[0, 0]], data=([[0, 0]], [[0]]))
+        self.assertRaisesRegex(fr.Error, "log: 6 states, and with inputs 8; the model has 1 and 2", small.fit, LOG)
 
     def test_warn_of_what_is_damaged_and_have_the_rest(self):
         whole = len(fr.Log(LOG, config=TASK).decisions()["utime"])

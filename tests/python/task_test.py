@@ -265,6 +265,31 @@ class Tasks(unittest.TestCase):
         self.assertRaisesRegex(fr.Error, "must be a dict or a text, or its keys by name", fr.Task, keys, model={})
         self.assertRaisesRegex(fr.Error, "no_such", fr.Task, **keys, no_such=1)
 
+    def test_are_given_in_the_papers_words(self):
+        data = (np.array([[0, 1, 0], [0, -1, 0.5]]), np.array([[0.1, 0.99], [-0.1, -0.94]]))
+        paper = dict(equations=self.SMALL["model"], domain=self.SMALL["domain"], data=data)
+        task = fr.Task(L={"v": {"v": 0.02}}, **paper)
+        exact = {**self.SMALL, "declaration": {"lipschitz": {"v": {"v": 0.02}}, "noise_bound": [0, 0]}}
+        U, x0 = [[0.5]] * 9, ([0, 0.5], [0.1, 0.1])
+        expected = fr.Task(exact, data=data).certify(U, x0).tube.hull
+        for same in [task, fr.Task(L=np.array([[0, 0, 0], [0, 0.02, 0]]), path="here", **paper),
+                     fr.Task(L={"v": {"v": 0.02}}, task=self.SMALL["task"], declaration={"state_error": {}}, **paper)]:
+            np.testing.assert_array_equal(same.certify(U, x0).tube.hull, expected)
+        decision = task.certify(U, x0)
+        self.assertEqual((decision.certified, decision.obstacle, decision.clearance), (True, None, None))
+        self.assertIn("no obstacle", decision.message)
+        self.assertTrue(decision.plot())
+        noisy = fr.Task(L={"v": {"v": 0.02}}, declaration={"noise_bound": [0, 0.01]}, **paper).certify(U, x0)
+        self.assertGreater(np.ptp(noisy.tube.hull[1, 1]), np.ptp(expected[1, 1]))
+        for missing in ["equations", "domain"]:
+            self.assertRaisesRegex(TypeError, missing, fr.Task, L=[[0]], **{k: v for k, v in paper.items() if k != missing})
+        self.assertRaisesRegex(TypeError, "L", fr.Task, **paper)
+        self.assertRaisesRegex(TypeError, "model", fr.Task, L=[[0]], model={}, **paper)
+        self.assertRaisesRegex(TypeError, "lipschitz", fr.Task, L=[[0]], declaration={"lipschitz": [[0]]}, **paper)
+        self.assertRaisesRegex(fr.Error, "model", fr.Task, L=[[0]], **{**paper, "equations": "x"})
+        self.assertRaisesRegex(fr.Error, "transitions: missing", fr.Task, L=[[0] * 3] * 2, **{**paper, "data": None})
+        self.assertRaisesRegex(fr.Error, "lipschitz", fr.Task, L=[[0]], **paper)
+
     def test_learn_what_they_observe(self):
         task = self.small()
         before = task.certify([[0.5]] * 10)
@@ -287,12 +312,13 @@ class Tasks(unittest.TestCase):
         rng = np.random.default_rng(1)
         for v in rng.uniform(-1, 1, 30):
             self.assertEqual(task.observe([0, v, 0], [0.1 * v, 0.99 * v + rng.normal(0, 1e-10)]), "")
-        self.assertAlmostEqual(task.fit(["drag"])["parameters"]["drag"], 0.01, 6)
-        self.assertEqual(task.fit()["parameters"], task.fit(["drag"])["parameters"])
+        self.assertAlmostEqual(task.fit(parameters=["drag"])["parameters"]["drag"], 0.01, 6)
+        self.assertEqual(task.fit()["parameters"], task.fit(None, ["drag"])["parameters"])
         found = task.declare(by=["v"], factor=1.0, estimate_disturbance=False)
         self.assertEqual((found["lipschitz"].shape, found["disturbance"].tolist()), ((2, 3), [0, 0]))
         self.assertTrue(0.0099 < found["lipschitz"][1, 1] < 0.0101, found)
-        self.assertRaises(fr.Error, task.fit, ["nosuch"])
+        self.assertRaises(fr.Error, task.fit, None, ["nosuch"])
+        self.assertRaisesRegex(TypeError, "list", task.fit, ["drag"])
         self.assertRaises(fr.Error, task.declare, by=["nosuch"])
 
     def test_serve_many_threads_while_they_learn(self):
