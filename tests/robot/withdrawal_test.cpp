@@ -412,6 +412,20 @@ TEST_F(SupervisorWithdrawTest, AStopThatJustFitsMayWaitForABoundaryAndOneThatDoe
   }
 }
 
+// What is declared of it is needed: nothing refutes it.
+TEST_F(SupervisorWithdrawTest, ABrakeWeakerThanDeclaredIsNotAtRestWhereWhatStandsEnds) {
+  Make(kFarthest);
+  Accept(PlanFrom(0, 7));
+  EXPECT_TRUE(Boundary(0));
+  Withdraw(PlanFrom(0, 7), 2);
+  EXPECT_FALSE(Boundary(1)) << "a step of what stands is left";
+  for (const double real : {kFarthest, kFarthest * (1 - 1e-8)}) {
+    State x{kFarthest, -2};
+    Brake({real, 0}).Apply(x, 1, x);
+    EXPECT_EQ(x[0] == 0, real == kFarthest);
+  }
+}
+
 TEST_F(SupervisorWithdrawTest, AStopOfWhichNothingIsKnownBeginsAtOnceUnlessAPlanTakesOver) {
   for (const bool takes_over : {true, false}) {
     Remake();
