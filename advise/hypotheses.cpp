@@ -145,6 +145,11 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
     all.push_back({"the robot's clock runs true while a plan is executed",
                    "declared; the guard sees that it was set only if a step is off its time then"});
   AddRatesAndTurns(config, all);
+  if (const bool is_declared = !config.robot.emergency_stop.empty();
+      is_declared || config.gate.obstacles == ObstaclesSource::kBus)
+    all.push_back({std::string("after a withdrawal, which no certificate covers, the robot stops ") +
+                       (is_declared ? "as robot.emergency_stop says" : "at once"),
+                   "declared"});
   const std::string falsify = std::string("declared; transitions of the file ") +
                               (config.gate.learns ? "and of the bus " : "") + "that contradict it falsify it (F)";
   const auto& [rows, columns] = declaration.affine;

@@ -279,6 +279,12 @@ TEST(Hypotheses, NameThoseWhoUpholdThemAndNobodyElse) {
   problem.timing.rate_bound = {};
   problem.declaration.state_error = {};
   EXPECT_THAT(upheld("turns theta by three quarters"), HasSubstr("model.angles"));
+  config.gate.obstacles = ObstaclesSource::kTask;
+  EXPECT_EQ(upheld("after a withdrawal"), "");
+  config.gate.obstacles = ObstaclesSource::kBus;
+  EXPECT_EQ(upheld("after a withdrawal, which no certificate covers, the robot stops at once"), "declared");
+  config.robot.emergency_stop = {{"v", 8}};
+  EXPECT_EQ(upheld("the robot stops as robot.emergency_stop says"), "declared");
 }
 
 }  // namespace forereach::advice_test
