@@ -225,7 +225,10 @@ py::dict Declare(const JudgingTask& task, const std::vector<std::string>& by, do
 
 // The observations, or the executed steps of a log. As `forereach fit`, it takes those outside the domain, too.
 Transitions StepsToFit(const JudgingTask& task, const py::object& log) {
-  if (log.is_none()) return WithoutWrappedAngle(task)->transitions;
+  if (log.is_none()) {
+    const py::gil_scoped_release release;
+    return WithoutWrappedAngle(task)->transitions;
+  }
   const auto [z, next] = PairOf(py::module_::import("forereach._task").attr("steps_of")(log, task.config().period));
   const Transitions steps{RowsOf(z, "log: z"), RowsOf(next, "log: x_next")};
   const NominalModel& model = task.model();
