@@ -67,6 +67,7 @@ Digest DeclarationDigest(const NominalModel& model, const Declaration& declarati
     bytes.Text(name);
     bytes.Numbers(bounds);
   };
+  // What is not declared adds no bytes: a key that is new changes the digest of no task without it.
   add("disturbance", declaration.disturbance);
   if (declaration.growing) {
     bytes.Text("growing disturbance");

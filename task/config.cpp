@@ -37,15 +37,15 @@ Transitions ReadTransitions(const std::string& path, const NominalModel& model, 
   const std::vector<std::string> columns = TransitionColumns(model);
   const Eigen::MatrixXd rows = ReadCsv(
       path, columns, named_by, "; `forereach import` makes transitions of a log with other columns", kDurationColumn);
-  if (rows.rows() == 0) throw ConfigError(path + ":2: no transitions; at least one is needed");
+  if (rows.rows() == 0) throw ConfigError("{}:2: no transitions; at least one is needed", path);
   Transitions read{rows.leftCols(model.num_variables()), rows.middleCols(model.num_variables(), model.num_states())};
   if (rows.cols() == std::ssize(columns)) return read;
   read.longer = rows.rightCols<1>();
   const Range allowed{0, TooFarOff(model), false, true};
   for (Eigen::Index i = 0; i < read.longer.size(); ++i)
     if (const double longer = read.longer[i]; !allowed.Contains(longer))
-      throw ConfigError(fmt::format("{}:{}: {}: {} is outside {}, from 0 up to half of model.dt", path, i + 2,
-                                    kDurationColumn, ToText(longer), allowed.text()));
+      throw ConfigError("{}:{}: {}: {} is outside {}, from 0 up to half of model.dt", path, i + 2, kDurationColumn,
+                        ToText(longer), allowed.text());
   return read;
 }
 
@@ -53,7 +53,7 @@ Transitions ReadTransitions(const std::string& path, const NominalModel& model, 
 void RequireDurations(const std::string& path, const Problem& problem) try {
   ValidateDurations(problem);
 } catch (const std::invalid_argument& error) {
-  throw ConfigError(fmt::format("{}: {}: {}", path, kDurationColumn, error.what()));
+  throw ConfigError("{}: {}: {}", path, kDurationColumn, error.what());
 }
 
 // What a transition violates, in the words of the task file.
@@ -64,12 +64,12 @@ std::string Describe(const DomainExit& exit, const Domain& domain, const Nominal
     const Eigen::Index l = exit.index, n = model.num_states();
     const Box& box = l < n ? domain.state : domain.input;
     const Eigen::Index k = l < n ? l : l - n;
-    return names[ToSize(l)] + ": " + ToText(exit.value) + " is outside " +
-           Range{box.lower()[k], box.upper()[k], false, false}.text() + " of domain." + (l < n ? "state" : "input");
+    return fmt::format("{}: {} is outside {} of domain.{}", names[ToSize(l)], ToText(exit.value),
+                       Range{box.lower()[k], box.upper()[k], false, false}.text(), l < n ? "state" : "input");
   }
   std::string involved;
   const auto involve = [&](Eigen::Index l) { involved += (involved.empty() ? "" : ", ") + names[ToSize(l)]; };
-  const std::string limit = ToText(exit.value) + " is outside (-inf, " + ToText(exit.bound) + "] of domain.";
+  const std::string limit = fmt::format("{} is outside (-inf, {}] of domain.", ToText(exit.value), ToText(exit.bound));
   if (exit.kind == Kind::kBall) {
     for (const int l : domain.balls[ToSize(exit.index)].coordinates) involve(l);
     return fmt::format("{}: distance {}balls[{}]", involved, limit, exit.index);
@@ -88,7 +88,7 @@ void RequireInside(const std::string& path, const Transitions& transitions, cons
     for (Eigen::Index l = 0; l < transitions.z.cols(); ++l) point[ToSize(l)] = Interval(transitions.z(i, l));
     const DomainExit exit = FindExit(domain, {point.data(), size});
     if (exit.kind != DomainExit::Kind::kNone)
-      throw ConfigError(fmt::format("{}:{}: {}", path, i + 2, Describe(exit, domain, model)));
+      throw ConfigError("{}:{}: {}", path, i + 2, Describe(exit, domain, model));
   }
 }
 
@@ -102,9 +102,10 @@ std::vector<int> KeepThoseWithin(const std::string& path, Problem& problem) {
     if (IsWithin(problem, {z.data(), ToSize(z.size())}, false)) rows.push_back(i);
   }
   if (rows.empty())
-    throw ConfigError(path +
-                      ": no transition is inside the domain with all of declaration.state_error and "
-                      "declaration.input_error; at least one is needed");
+    throw ConfigError(
+        "{}: no transition is inside the domain with all of declaration.state_error and "
+        "declaration.input_error; at least one is needed",
+        path);
   if (std::ssize(rows) < all.size()) {
     Transitions kept{all.z(rows, Eigen::all), all.x_next(rows, Eigen::all)};
     if (all.longer.size() > 0) kept.longer = all.longer(rows);
@@ -118,11 +119,11 @@ std::vector<int> KeepThoseWithin(const std::string& path, Problem& problem) {
 void RequireObservable(const std::string& path, const std::vector<int>& rows, const Problem& problem) try {
   static_cast<void>(Observe(*problem.model, problem.declaration, problem.transitions, problem.timing));
 } catch (const AmbiguousAngle& error) {
-  throw ConfigError(fmt::format("{}:{}: {}", path, rows[ToSize(error.row())] + 2, error.what()));
+  throw ConfigError("{}:{}: {}", path, rows[ToSize(error.row())] + 2, error.what());
 } catch (const NoNominalValue& error) {
-  throw ConfigError(fmt::format(
+  throw ConfigError(
       "{}:{}: {}; change the model's equations or parameters, or take the state out of the domain and the data", path,
-      rows[ToSize(error.row())] + 2, error.text()));
+      rows[ToSize(error.row())] + 2, error.text());
 }
 
 // What a task that defines rest need not say again.
@@ -150,10 +151,9 @@ void RequireSteps(const Document& file, const Problem& problem) try {
 Transitions TransitionsOf(const Transitions& data, const NominalModel& model) {
   const auto require = [&](const char* what, const Eigen::MatrixXd& given, int columns) {
     if (given.rows() == 0 || given.rows() != data.z.rows() || given.cols() != columns)
-      throw ConfigError(
-          fmt::format("data: {} has {} rows and {} columns, has to have {} rows, at least 1, and {} columns", what,
-                      given.rows(), given.cols(), data.z.rows(), columns));
-    if (!given.allFinite()) throw ConfigError(fmt::format("data: {} has a number that is not finite", what));
+      throw ConfigError("data: {} has {} rows and {} columns, has to have {} rows, at least 1, and {} columns", what,
+                        given.rows(), given.cols(), data.z.rows(), columns);
+    if (!given.allFinite()) throw ConfigError("data: {} has a number that is not finite", what);
   };
   require("z", data.z, model.num_variables());
   require("x_next", data.x_next, model.num_states());
@@ -186,6 +186,7 @@ Config Load(Document& file, TransitionsFile transitions, const NamedFiles& inste
   }
   config.path = file.path();
   config.transitions = transitions_path;
+  // Before rows are left out: the observations' digest is that of the file.
   config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);
   if (transitions == TransitionsFile::kRead) {
     const int all = problem.transitions.size();
@@ -203,9 +204,9 @@ Config Load(Document& file, TransitionsFile transitions, const NamedFiles& inste
   if (problem.between) problem.between->period = LongestPeriod(config);
   if (problem.between || knows_time || StepErrorUs(config.gate)) config.gate.step_us = StepUs(config);
   if (config.gate.step_us != 0 && std::llround(config.robot.step_period_ms * 1e3) != config.gate.step_us)
-    file.Fail("robot.step_period_ms", "is " + ToText(config.robot.step_period_ms) + ", and has to be model.dt, " +
-                                          ToText(config.period * 1e3) +
-                                          " ms: task.between and a clock are about steps of this time");
+    file.Fail("robot.step_period_ms",
+              fmt::format("is {}, and has to be model.dt, {} ms: task.between and a clock are about steps of this time",
+                          ToText(config.robot.step_period_ms), ToText(config.period * 1e3)));
   config.problem = std::make_shared<const Problem>(std::move(problem));
   return std::move(config);
 }
@@ -239,50 +240,54 @@ NamedFiles FilesNamedBy(const std::string& path) {
 void RequireForCertifying(const Config& config) {
   if (config.says_between || config.problem->method == Method::kPaper) return;
   throw ConfigError(
-      config.path +
-      ": task.between: missing. Write under `task:` the line `between: {acceleration: [...]}` with bounds on the true "
-      "motion from one sample to the next, which `forereach declare --between` proposes: a certificate holds at all "
-      "times. Or write `between: samples`: it holds at its sample instants only");
+      "{}: task.between: missing. Write under `task:` the line `between: {{acceleration: [...]}}` with bounds on the "
+      "true motion from one sample to the next, which `forereach declare --between` proposes: a certificate holds at "
+      "all times. Or write `between: samples`: it holds at its sample instants only",
+      config.path);
 }
 
 void RequireForCertifyingOnBus(const Config& config) {
   RequireForCertifying(config);
   if (config.gate.obstacles == ObstaclesSource::kUnsaid)
-    throw ConfigError(config.path +
-                      ": gate.obstacles: missing. `bus`: the obstacles are those of this file and those of the last "
-                      "OBSTACLES message; nothing is certified before the first message or while there are none. "
-                      "`task`: the obstacles are those of this file");
+    throw ConfigError(
+        "{}: gate.obstacles: missing. `bus`: the obstacles are those of this file and those of the last "
+        "OBSTACLES message; nothing is certified before the first message or while there are none. `task`: "
+        "the obstacles are those of this file",
+        config.path);
   if (config.gate.obstacles == ObstaclesSource::kBus && !config.gate.obstacles_lost_ms)
-    throw ConfigError(config.path +
-                      ": gate.obstacles_lost_ms: missing. With `gate.obstacles: bus`, plans under way are withdrawn, "
-                      "which is an emergency stop, once the obstacles have been unknown for this many milliseconds. "
-                      "`never`: the robot executes its plan to the end, through whatever has come there");
+    throw ConfigError(
+        "{}: gate.obstacles_lost_ms: missing. With `gate.obstacles: bus`, plans under way are withdrawn, "
+        "which is an emergency stop, once the obstacles have been unknown for this many milliseconds. "
+        "`never`: the robot executes its plan to the end, through whatever has come there",
+        config.path);
   if (config.gate.needs_robot_state && !config.problem->declaration.DeclaresStateError())
-    throw ConfigError(config.path +
-                      ": declaration.state_error: missing. Write under `declaration:` how far the true state may be "
-                      "from the one that the robot measures, `state_error: {STATE: BOUND, ...}` in the unit of each "
-                      "state; one that is not named is exact. Write `state_error: {}` if you mean 0 for all");
+    throw ConfigError(
+        "{}: declaration.state_error: missing. Write under `declaration:` how far the true state may be "
+        "from the one that the robot measures, `state_error: {{STATE: BOUND, ...}}` in the unit of each "
+        "state; one that is not named is exact. Write `state_error: {{}}` if you mean 0 for all",
+        config.path);
   if (config.gate.needs_robot_state && !config.gate.step_error_ms)
     throw ConfigError(
-        config.path +
-        ": robot.step_error_ms: missing. Write under `robot:` how far the boundaries of steps may be from their times, "
-        "in ms, which `forereach doctor` measures: the guard ends a plan that is further off. Or write `step_error_ms: "
-        "any`: nobody looks at a clock, and certificates hold for steps that are on time");
+        "{}: robot.step_error_ms: missing. Write under `robot:` how far the boundaries of steps may be from their "
+        "times, in ms, which `forereach doctor` measures: the guard ends a plan that is further off. Or write "
+        "`step_error_ms: any`: nobody looks at a clock, and certificates hold for steps that are on time",
+        config.path);
   const auto moving = std::ranges::find_if(config.obstacles, [](const Obstacle& o) { return o.motion().has_value(); });
   if (moving != config.obstacles.end())
-    throw ConfigError(fmt::format(
+    throw ConfigError(
         "{}: task.obstacles[{}].motion: its times begin with the plan, so it is for `forereach certify`. On a bus, "
         "write `gate: {{obstacles: bus}}`, and send the obstacle of a file of its own with `forereach obstacles`",
-        config.path, moving - config.obstacles.begin()));
+        config.path, moving - config.obstacles.begin());
 }
 
 std::vector<int> HeldStates(const Config& config) {
   const NominalModel& model = *config.problem->model;
   const NamedModel* const named = FindNamed(model);
   if (!config.robot.hold && named == nullptr)
-    throw ConfigError(config.path +
-                      ": robot.hold: missing: it names the states that are zero while the robot stands, and a model as "
-                      "text does not say which; by default they are those of task.rest, which is missing, too");
+    throw ConfigError(
+        "{}: robot.hold: missing: it names the states that are zero while the robot stands, and a model as "
+        "text does not say which; by default they are those of task.rest, which is missing, too",
+        config.path);
   const std::vector<std::string> names =
       config.robot.hold ? *config.robot.hold : std::vector<std::string>(named->standing.begin(), named->standing.end());
   std::vector<int> held;
@@ -301,8 +306,7 @@ void SaveTransitions(const std::string& path, const NominalModel& model, const T
   rows << transitions.z, transitions.x_next;
   if (!transitions.longer.isZero(0)) {
     if (std::ranges::count(columns, kDurationColumn) > 0)
-      throw ConfigError(
-          fmt::format("{}: the model has a variable of the name {}: give it another", path, kDurationColumn));
+      throw ConfigError("{}: the model has a variable of the name {}: give it another", path, kDurationColumn);
     columns.emplace_back(kDurationColumn);
     rows.conservativeResize(Eigen::NoChange, std::ssize(columns));
     rows.rightCols<1>() = transitions.longer;
@@ -313,8 +317,8 @@ void SaveTransitions(const std::string& path, const NominalModel& model, const T
 Eigen::MatrixXd LoadPlan(const std::string& path, const NominalModel& model) {
   const Eigen::MatrixXd rows = ReadCsv(path, model.input_names());
   if (rows.rows() < 1 || rows.rows() > kMaxSteps)
-    throw ConfigError(fmt::format("{}:{}: {} steps are outside [1, {}]", path,
-                                  std::min<Eigen::Index>(rows.rows(), kMaxSteps) + 2, rows.rows(), kMaxSteps));
+    throw ConfigError("{}:{}: {} steps are outside [1, {}]", path, std::min<Eigen::Index>(rows.rows(), kMaxSteps) + 2,
+                      rows.rows(), kMaxSteps);
   return rows.transpose();
 }
 

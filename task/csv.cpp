@@ -20,7 +20,7 @@ namespace forereach {
 namespace {
 
 [[noreturn]] void FailAt(const std::string& path, int line, const std::string& what) {
-  throw ConfigError(fmt::format("{}:{}: {}", path, line, what));
+  throw ConfigError("{}:{}: {}", path, line, what);
 }
 
 void Split(std::string_view line, std::vector<std::string_view>& fields) {
@@ -37,8 +37,8 @@ void RequireCommas(const std::string& path, const std::vector<std::string_view>&
   for (const auto& [other, name] : kOthers)
     if (fields[0].find(other) != std::string_view::npos)
       FailAt(path, 1,
-             std::string("the columns are separated by ") + name +
-                 "; put commas in their place, and decimal points in numbers" + advice);
+             fmt::format("the columns are separated by {}; put commas in their place, and decimal points in numbers{}",
+                         name, advice));
 }
 
 // For each field of the header, the column it is of.
@@ -49,14 +49,15 @@ std::vector<Eigen::Index> ReadHeader(const std::string& path, const std::vector<
   for (const std::string_view field : fields) {
     const auto column = std::find(columns.begin(), columns.end(), field);
     if (column == columns.end())
-      FailAt(path, 1, "unknown column '" + std::string(field) + "'; the columns are " + Joined(columns) + advice);
+      FailAt(path, 1, fmt::format("unknown column '{}'; the columns are {}{}", field, Joined(columns), advice));
     const Eigen::Index index = column - columns.begin();
-    if (std::find(order.begin(), order.end(), index) != order.end()) FailAt(path, 1, *column + ": duplicate column");
+    if (std::find(order.begin(), order.end(), index) != order.end())
+      FailAt(path, 1, fmt::format("{}: duplicate column", *column));
     order.push_back(index);
   }
   for (std::size_t j = 0; j < columns.size(); ++j)
     if (std::find(order.begin(), order.end(), static_cast<Eigen::Index>(j)) == order.end())
-      FailAt(path, 1, columns[j] + ": the column is missing" + advice);
+      FailAt(path, 1, fmt::format("{}: the column is missing{}", columns[j], advice));
   return order;
 }
 
@@ -73,6 +74,7 @@ class Reader {
     int blank = 0;  // the first of the blank lines that may end the file
     for (std::string text; in.Next(text);) {
       const int line = in.line();
+      // A blank line between rows is a row that was lost, so only the end may have some.
       if (line > 1 && Trimmed(text).empty()) {
         blank = blank == 0 ? line : blank;
         continue;
@@ -88,7 +90,7 @@ class Reader {
       }
     }
     if (rows < 0)
-      throw ConfigError(path_ + ":1: the file is empty; it has to begin with the header " + Joined(columns_));
+      throw ConfigError("{}:1: the file is empty; it has to begin with the header {}", path_, Joined(columns_));
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     return Eigen::Map<const RowMajor>(numbers_.data(), rows, std::ssize(columns_));
   }
@@ -106,8 +108,7 @@ class Reader {
       const auto column = ToSize(order[j]);
       const auto [value, problem] = ParseNumber(fields[j]);
       if (!problem.empty())
-        FailAt(path_, line,
-               columns_[column] + ": '" + std::string(fields[j].substr(0, 40)) + "' " + std::string(problem));
+        FailAt(path_, line, fmt::format("{}: '{}' {}", columns_[column], fields[j].substr(0, 40), problem));
       numbers_[row + column] = value;
     }
   }
@@ -122,14 +123,15 @@ class Reader {
 
 std::vector<std::string> CsvColumns(const std::string& path) {
   std::string text;
-  if (!LineReader(path).Next(text)) throw ConfigError(path + ":1: the file is empty; it has to begin with a header");
+  if (!LineReader(path).Next(text)) throw ConfigError("{}:1: the file is empty; it has to begin with a header", path);
   std::vector<std::string_view> fields;
   Split(text, fields);
   RequireCommas(path, fields, "");
   std::vector<std::string> columns(fields.begin(), fields.end());
   for (const std::string& column : columns) {
     if (column.empty()) FailAt(path, 1, "a column has no name");
-    if (std::ranges::count(columns, column) > 1) FailAt(path, 1, column.substr(0, 64) + ": duplicate column");
+    if (std::ranges::count(columns, column) > 1)
+      FailAt(path, 1, fmt::format("{}: duplicate column", column.substr(0, 64)));
   }
   return columns;
 }
@@ -149,7 +151,7 @@ void WriteCsv(const std::string& path, const std::vector<std::string>& columns, 
   for (Eigen::Index i = 0; i < rows.rows(); ++i)
     write_row([&](std::size_t j) { return ToText(rows(i, static_cast<Eigen::Index>(j))); });
   out.close();
-  if (!out) throw ConfigError(path + ": cannot be written: " + std::generic_category().message(errno));
+  if (!out) throw ConfigError("{}: cannot be written: {}", path, std::generic_category().message(errno));
 }
 
 }  // namespace forereach

@@ -8,7 +8,6 @@
 #include <stdexcept>
 
 #include <fmt/format.h>
-
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
@@ -104,11 +103,13 @@ std::string NumberName(Type type) { return FormName(type == Type::kInteger ? Typ
 
 // ", its unit is s"; empty for a pure number, and where each entry of a list has a unit of its own.
 std::string UnitOf(const Key& row) {
-  return row.unit.empty() || row.unit.starts_with("of ") ? "" : ", its unit is " + row.unit;
+  return row.unit.empty() || row.unit.starts_with("of ") ? "" : fmt::format(", its unit is {}", row.unit);
 }
 
 // What a number has to be: "write a number in (0, 60], its unit is s".
-std::string Wanted(const Key& row) { return "write " + NumberName(row.type) + " in " + row.range.text() + UnitOf(row); }
+std::string Wanted(const Key& row) {
+  return fmt::format("write {} in {}{}", NumberName(row.type), row.range.text(), UnitOf(row));
+}
 
 Parsed<double> Parse(const std::string& token, Type type) {
   if (type != Type::kInteger) return ParseNumber(token);
@@ -152,9 +153,9 @@ std::string Correction(const std::string& token, const Key& row) {
       {with_point, ", with a point"},
       {Without(token, "_ '"), ""},
       {row.type == Type::kInteger ? AsInteger(token) : token, ""},
-      {Leading(token), " alone" + UnitOf(row)}};
+      {Leading(token), fmt::format(" alone{}", UnitOf(row))}};
   for (const auto& [other, remark] : tries)
-    if (other != token && Parse(other, row.type).problem.empty()) return "write " + other + remark;
+    if (other != token && Parse(other, row.type).problem.empty()) return fmt::format("write {}{}", other, remark);
   return Wanted(row);
 }
 
@@ -225,7 +226,8 @@ class Checker {
   // For what has no node of its own: a key, or an entry of a list of names.
   [[noreturn]] static void Fail(const Node& in, const YAML::Node& yaml, const std::string& key,
                                 const std::string& what) {
-    throw ConfigError(At(in.document.path(), LineOf(yaml.Mark())) + OneLine(key + (key.empty() ? "" : ": ") + what));
+    throw ConfigError(At(in.document.path(), LineOf(yaml.Mark())) +
+                      OneLine(fmt::format("{}{}{}", key, key.empty() ? "" : ": ", what)));
   }
 
   // The row of a key whose value is a number or one of these words. Null if it is none of them.
@@ -255,7 +257,7 @@ class Checker {
     if (last && forms == FormName(last->type) && IsNumber(last->type)) return *last;
     // A list of a wrong kind is best explained entry by entry.
     if (last && node.IsSequence() && (last->type == Type::kVectors || last->type == Type::kNames)) return *last;
-    Fail(at, Shown(node) + " is not " + forms);
+    Fail(at, fmt::format("{} is not {}", Shown(node), forms));
   }
 
   void CheckMap(Node& at, const std::string& pattern) {
@@ -264,14 +266,16 @@ class Checker {
     std::map<std::string, int> seen;            // the line of each
     std::multimap<const Key*, Node*> children;  // in the schema's order, since its rows are in one array
     for (const auto& entry : at.yaml) {
-      if (!entry.first.IsScalar()) Fail(at, entry.first, at.key, Shown(entry.first) + " is not a key");
+      if (!entry.first.IsScalar()) Fail(at, entry.first, at.key, fmt::format("{} is not a key", Shown(entry.first)));
       const std::string word = entry.first.Scalar(), key = Below(at.key, word);
       const Key& row = ChildRow(at, entry.first, pattern);
       const auto [first, is_new] = seen.emplace(word, LineOf(entry.first.Mark()));
+      // yaml-cpp takes a map with both.
       if (!is_new)
         Fail(at, entry.first, key, fmt::format("duplicate key, first in line {}; delete one of them", first->second));
       if (!row.only.empty() && row.only != kind)
-        Fail(at, entry.first, key, "is for " + row.only + (kind.empty() ? "" : ", not for " + kind));
+        Fail(at, entry.first, key,
+             fmt::format("is for {}{}", row.only, kind.empty() ? "" : fmt::format(", not for {}", kind)));
       children.emplace(&row, at.entries.emplace_back(new Node{at.document, key, word, entry.second}).get());
     }
     // A row's reader relies on the rows before it.
@@ -279,7 +283,7 @@ class Checker {
       if (!IsChild(row, pattern)) continue;
       if (row.required && (row.only.empty() || row.only == kind) && !seen.contains(std::string(Leaf(row.path))) &&
           !Leaf(row.path).starts_with('<'))
-        Fail(at, at.yaml, Below(at.key, Leaf(row.path)), "missing: " + row.meaning);
+        Fail(at, at.yaml, Below(at.key, Leaf(row.path)), fmt::format("missing: {}", row.meaning));
       const auto [begin, end] = children.equal_range(&row);
       for (auto child = begin; child != end; ++child) Check(*child->second, row.path);
     }
@@ -306,8 +310,10 @@ class Checker {
     }
     if (const std::size_t colon = word.find(':'); colon != std::string::npos && Contains(known, word.substr(0, colon)))
       Fail(map, entry, Below(map.key, word),
-           "unknown key; write a space after the colon: " + word.substr(0, colon) + ": " + word.substr(colon + 1));
-    Fail(map, entry, Below(map.key, word), "unknown key; " + CommaAdvice(word) + Suggestion(word, known));
+           fmt::format("unknown key; write a space after the colon: {}: {}", word.substr(0, colon),
+                       word.substr(colon + 1)));
+    Fail(map, entry, Below(map.key, word),
+         fmt::format("unknown key; {}{}", CommaAdvice(word), Suggestion(word, known)));
   }
 
   static void RequireName(const Node& map, const YAML::Node& entry) {
@@ -315,8 +321,8 @@ class Checker {
     const std::string at = Below(map.key, word.substr(0, kLongestName));
     if (!IsName(word))
       Fail(map, entry, at,
-           "is not a name; " + CommaAdvice(word) +
-               "a name has letters, digits and underscores, and does not begin with a digit");
+           fmt::format("is not a name; {}a name has letters, digits and underscores, and does not begin with a digit",
+                       CommaAdvice(word)));
     if (word.size() > kLongestName)
       Fail(map, entry, at,
            fmt::format("...: the name has {} letters, at most {} are allowed", word.size(), kLongestName));
@@ -331,24 +337,25 @@ class Checker {
 
   static void CheckNumber(Node& at, const Key& row) {
     const YAML::Node& node = at.yaml;
-    const std::string not_one = " is not " + NumberName(row.type);
-    if (node.IsNull()) Fail(at, "has no value; " + Wanted(row));
-    if (!node.IsScalar()) Fail(at, Shown(node) + not_one + "; " + Wanted(row));
+    const std::string not_one = fmt::format(" is not {}", NumberName(row.type));
+    if (node.IsNull()) Fail(at, fmt::format("has no value; {}", Wanted(row)));
+    if (!node.IsScalar()) Fail(at, fmt::format("{}{}; {}", Shown(node), not_one, Wanted(row)));
     const std::string& token = node.Scalar();
     if (!HasForm(node, Type::kNumber))
-      Fail(at, "\"" + Shown(node) + "\" is " + (node.Tag() == "!" ? "quoted text" : "tagged " + node.Tag()) + ", not " +
-                   NumberName(row.type) + "; " +
-                   (Parse(token, row.type).problem.empty()
-                        ? "write " + token + (node.Tag() == "!" ? " without quotes" : " alone")
-                        : Wanted(row)));
+      Fail(at,
+           fmt::format("\"{}\" is {}, not {}; {}", Shown(node),
+                       node.Tag() == "!" ? "quoted text" : fmt::format("tagged {}", node.Tag()), NumberName(row.type),
+                       Parse(token, row.type).problem.empty()
+                           ? fmt::format("write {}{}", token, node.Tag() == "!" ? " without quotes" : " alone")
+                           : Wanted(row)));
     const auto [value, problem] = Parse(token, row.type);
-    if (!problem.empty()) Fail(at, Shown(node) + " " + std::string(problem) + "; " + Correction(token, row));
-    if (!row.range.Contains(value)) Fail(at, token + " is outside " + row.range.text());
+    if (!problem.empty()) Fail(at, fmt::format("{} {}; {}", Shown(node), problem, Correction(token, row)));
+    if (!row.range.Contains(value)) Fail(at, fmt::format("{} is outside {}", token, row.range.text()));
     at.number = value;
   }
 
   void CheckVector(Node& at, const Key& row) const {
-    if (!at.yaml.IsSequence()) Fail(at, Shown(at.yaml) + " is not a list of numbers");
+    if (!at.yaml.IsSequence()) Fail(at, fmt::format("{} is not a list of numbers", Shown(at.yaml)));
     RequireSize(at, row);
     for (std::size_t i = 0; i < at.yaml.size(); ++i) CheckNumber(AddEntry(at, i), row);
   }
@@ -383,11 +390,13 @@ class Checker {
     const std::vector<std::string> known = row.size == Key::Size::kStates ? scope_.states : scope_.variables;
     std::vector<std::string> seen;
     for (std::size_t i = 0; i < at.yaml.size(); ++i) {
-      if (!at.yaml[i].IsScalar()) Fail(at, at.yaml[i], at.key + Index(i), Shown(at.yaml[i]) + " is not a name");
+      if (!at.yaml[i].IsScalar())
+        Fail(at, at.yaml[i], at.key + Index(i), fmt::format("{} is not a name", Shown(at.yaml[i])));
       const std::string& name = at.yaml[i].Scalar();
-      if (Contains(seen, name)) Fail(at, at.yaml[i], at.key + Index(i), "duplicate name " + name);
+      if (Contains(seen, name)) Fail(at, at.yaml[i], at.key + Index(i), fmt::format("duplicate name {}", name));
       if (!known.empty() && !Contains(known, name))
-        Fail(at, at.yaml[i], at.key + Index(i), name + " is not a coordinate; " + Suggestion(name, known));
+        Fail(at, at.yaml[i], at.key + Index(i),
+             fmt::format("{} is not a coordinate; {}", name, Suggestion(name, known)));
       seen.push_back(name);
     }
   }
@@ -399,10 +408,11 @@ class Checker {
                            expressions_, kLargestExpressions));
     if (text.empty() || text.find('\0') != std::string::npos) Fail(at, "is empty or not text");
     if (row.type == Type::kWord && std::find(row.words.begin(), row.words.end(), text) == row.words.end())
-      Fail(at, Shown(at.yaml) + " is not known; " + Suggestion(text, {row.words.begin(), row.words.end()}));
+      Fail(at,
+           fmt::format("{} is not known; {}", Shown(at.yaml), Suggestion(text, {row.words.begin(), row.words.end()})));
     if (row.type == Type::kChannel &&
         (text.size() > 63 || text.find_first_not_of(kChannelLetters) != std::string::npos))
-      Fail(at, Shown(at.yaml) + " is not 1 to 63 letters, digits and underscores");
+      Fail(at, fmt::format("{} is not 1 to 63 letters, digits and underscores", Shown(at.yaml)));
   }
 
   static constexpr const char* kChannelLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
@@ -445,15 +455,15 @@ YAML::Node ParseYaml(const std::string& path, const std::string& text) {
     std::istringstream in(text);
     YAML::Parser parser(in);
     Nobody nobody;
-    if (!parser.HandleNextDocument(nobody)) throw ConfigError(At(path, 1) + "has no YAML document, has to have one");
+    if (!parser.HandleNextDocument(nobody)) throw ConfigError("{}has no YAML document, has to have one", At(path, 1));
     if (parser.HandleNextDocument(nobody))
-      throw ConfigError(At(path, 1) + "has several YAML documents, has to have one");
+      throw ConfigError("{}has several YAML documents, has to have one", At(path, 1));
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
-    throw ConfigError(At(path, LineOf(error.mark)) +
-                      "not valid YAML; look at indentation, brackets, quotes, colons and words with * or &, here and "
-                      "in the line before" +
-                      TabAdvice(text, error.mark.line));
+    throw ConfigError(
+        "{}not valid YAML; look at indentation, brackets, quotes, colons and words with * or &, here and "
+        "in the line before{}",
+        At(path, LineOf(error.mark)), TabAdvice(text, error.mark.line));
   }
 }
 
@@ -538,7 +548,7 @@ const Field::Node* Field::Find(std::string_view name) const {
 
 Field Field::operator[](std::string_view name) const {
   if (const Node* node = Find(name)) return Field(*node);
-  throw std::logic_error("read without a check that it is there: " + Below(key(), name));
+  throw std::logic_error(fmt::format("read without a check that it is there: {}", Below(key(), name)));
 }
 
 Field Field::operator[](Eigen::Index i) const { return Field(*node_->entries.at(ToSize(i))); }
@@ -592,13 +602,13 @@ void Field::Read(std::vector<double>& value) const {
   value.assign(vector.begin(), vector.end());
 }
 
-std::string Field::Place() const { return At(file(), node_->line()) + key() + ": "; }
+std::string Field::Place() const { return fmt::format("{}{}: ", At(file(), node_->line()), key()); }
 
 void Field::Fail(const std::string& what) const { throw ConfigError(Place() + what); }
 
 void Field::Fail(std::string_view name, const std::string& what) const {
   if (const Node* node = Find(name)) Field(*node).Fail(what);
-  throw ConfigError(At(file(), node_->line()) + Below(key(), name) + ": " + what);
+  throw ConfigError("{}{}: {}", At(file(), node_->line()), Below(key(), name), what);
 }
 
 Document::Document(const std::string& path, const std::string& named_by)
@@ -614,7 +624,7 @@ Document::~Document() = default;
 void Document::Read(TaskDraft& draft, std::span<const Key> schema) try {
   Checker(schema, draft).Check(*root_, "");
 } catch (const YAML::Exception& error) {
-  throw ConfigError(At(path_, LineOf(error.mark)) + "a value here has another form than its key wants");
+  throw ConfigError("{}a value here has another form than its key wants", At(path_, LineOf(error.mark)));
 }
 
 Field Document::root() const { return Field(*root_); }
@@ -622,7 +632,7 @@ Field Document::root() const { return Field(*root_); }
 std::string Document::Place(std::string_view key) const {
   const Field::Node* known = root_.get();
   while (const Field::Node* entry = EntryTowards(*known, key)) known = entry;
-  return At(path_, known->line()) + std::string(key) + ": ";
+  return fmt::format("{}{}: ", At(path_, known->line()), key);
 }
 
 void Document::Fail(std::string_view key, const std::string& what) const { throw ConfigError(Place(key) + what); }

@@ -18,7 +18,7 @@
 namespace forereach {
 namespace {
 
-std::string Reason() { return "cannot be read: " + std::generic_category().message(errno); }
+std::string Reason() { return fmt::format("cannot be read: {}", std::generic_category().message(errno)); }
 
 std::string KindOf(mode_t mode) {
   if (S_ISDIR(mode)) return "is a directory, not a file";
@@ -51,14 +51,16 @@ std::size_t InputFile::Read(char* to, std::size_t most) {
   do count = ::read(descriptor_.get(), to, most);
   while (count < 0 && errno == EINTR);
   if (count < 0) Fail(fmt::format("reading failed after {} bytes: {}", read_, std::generic_category().message(errno)));
+  // Again: a file may grow while it is read.
   RequireAtMost(read_ += count);
   return static_cast<std::size_t>(count);
 }
 
-void InputFile::Fail(const std::string& what) const { throw ConfigError(named_by_ + path_ + ": " + what); }
+void InputFile::Fail(const std::string& what) const { throw ConfigError("{}{}: {}", named_by_, path_, what); }
 
 void InputFile::RequireAtMost(std::int64_t bytes) const {
-  if (bytes > most_bytes_) Fail("is larger than " + SizeText(most_bytes_) + ", the most that is read of such a file");
+  if (bytes > most_bytes_)
+    Fail(fmt::format("is larger than {}, the most that is read of such a file", SizeText(most_bytes_)));
 }
 
 std::string ReadWhole(const std::string& path, std::int64_t most_bytes, const std::string& named_by) {

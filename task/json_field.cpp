@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "forereach/numerics/text.h"
@@ -13,16 +12,18 @@
 namespace forereach {
 
 void JsonField::Fail(const std::string& what) const {
-  throw ConfigError(file_ + ": " + (name_.empty() ? "" : name_ + ": ") + what);
+  throw ConfigError("{}: {}{}", file_, name_.empty() ? "" : name_ + ": ", what);
 }
 
-void JsonField::FailAs(const std::string& kind) const { Fail(JsonText(json_).substr(0, 40) + " is " + kind); }
+void JsonField::FailAs(const std::string& kind) const {
+  Fail(fmt::format("{} is {}", JsonText(json_).substr(0, 40), kind));
+}
 
 JsonField JsonField::operator[](const std::string& name) const {
   if (!json_.is_object()) FailAs("no object");
   const auto found = json_.find(name);
-  if (found == json_.end()) Fail("has no " + name);
-  return {file_, name_ + (name_.empty() ? "" : ".") + name, *found};
+  if (found == json_.end()) Fail(fmt::format("has no {}", name));
+  return {file_, fmt::format("{}{}{}", name_, name_.empty() ? "" : ".", name), *found};
 }
 
 JsonField JsonField::operator[](std::size_t i) const { return {file_, fmt::format("{}[{}]", name_, i), json_.at(i)}; }
@@ -30,7 +31,7 @@ JsonField JsonField::operator[](std::size_t i) const { return {file_, fmt::forma
 void JsonField::RequireFields(const std::set<std::string>& names) const {
   for (const std::string& name : names) static_cast<void>((*this)[name]);
   for (const auto& [name, value] : json_.items())
-    if (!names.contains(name)) Fail("has a field " + name + " that does not belong there");
+    if (!names.contains(name)) Fail(fmt::format("has a field {} that does not belong there", name));
 }
 
 std::size_t JsonField::Count() const {
@@ -60,7 +61,7 @@ int JsonField::Integer(int lower, int upper) const {
 
 double JsonField::Number(double above) const {
   if (!json_.is_number() || !std::isfinite(json_.get<double>()) || !(json_.get<double>() > above))
-    FailAs("outside (" + ToText(above) + ", inf)");
+    FailAs(fmt::format("outside ({}, inf)", ToText(above)));
   return json_.get<double>();
 }
 

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 namespace forereach {
@@ -14,12 +13,14 @@ Json ParseJson(std::string_view text, int deepest) {
   using Event = typename Json::parse_event_t;
   std::vector<std::set<std::string>> keys;  // of the objects that are open
   return Json::parse(text, [&keys, deepest](int depth, Event event, Json& value) {
+    // Every level takes stack when the value is written or destroyed, and brackets are cheap to send.
     if (depth > deepest)
       throw Json::other_error::create(501, fmt::format("is nested deeper than {} levels", deepest), nullptr);
     if (event == Event::object_start) keys.emplace_back();
     if (event == Event::object_end) keys.pop_back();
+    // Readers differ in which of two they take, so a file with two could mean two things.
     if (event == Event::key && !keys.back().insert(value.template get<std::string>()).second)
-      throw Json::other_error::create(501, "has a duplicate key " + value.dump(), nullptr);
+      throw Json::other_error::create(501, fmt::format("has a duplicate key {}", value.dump()), nullptr);
     return true;
   });
 }
@@ -32,7 +33,7 @@ std::string DescribeJsonError(const std::exception& error) {
   };
   if (dynamic_cast<const nlohmann::json::parse_error*>(&error)) {
     const std::string place = after("parse error at ");
-    return "is no JSON at " + place.substr(0, place.find(':'));
+    return fmt::format("is no JSON at {}", place.substr(0, place.find(':')));
   }
   if (dynamic_cast<const nlohmann::json::other_error*>(&error)) return after("] ");  // ours
   if (dynamic_cast<const nlohmann::json::out_of_range*>(&error)) return "lacks a field or an entry that it has to have";

@@ -1,7 +1,6 @@
 #include "task/keep_in.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/limits.h"
@@ -63,6 +62,8 @@ std::vector<Obstacle> OutsideOf(const std::vector<Area>& areas, double margin) {
     all.insert(all.end(), area.outer.begin(), area.outer.end());
   }
   const Corners box = CornersAround(all);
+  // A frame around all areas. Only what lies between them is kept of it; beyond it four half-planes stand for
+  // everything.
   const double thick = std::max(box.upper.x - box.lower.x, box.upper.y - box.lower.y) / 1024;
   const auto below = [&](double at) { return std::min(at - thick, NextDown(at)); };
   const auto above = [&](double at) { return std::max(at + thick, NextUp(at)); };

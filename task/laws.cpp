@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "forereach/dynamics/expression.h"
 
 namespace forereach {
@@ -27,7 +29,7 @@ void CheckDefinitions(const NominalModel& model, const Laws& laws) {
   for (const ModelText::Definition& definition : laws.definitions) {
     if (known.Find(definition.name) >= 0)
       throw ExpressionError(definition.value.line, definition.value.column,
-                            "the name " + definition.name + " is used twice");
+                            fmt::format("the name {} is used twice", definition.name));
     static_cast<void>(ParseExpression(definition.value, known));
     static_cast<void>(known.Add(definition.name));
   }

@@ -3,7 +3,6 @@ back_off, hints, at_rest and let. */
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "forereach/certify/problem.h"

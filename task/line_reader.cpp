@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include <fmt/format.h>
-
 #include "task/config_error.h"
 
 namespace forereach {
@@ -41,8 +39,7 @@ bool LineReader::ReadLine(std::string& text) {
     const std::string_view rest(chunk_.data() + begin_, end_ - begin_);
     const std::size_t length = std::min(rest.find('\n'), rest.size());
     if (text.size() + length > kLongestLine)
-      throw ConfigError(
-          fmt::format("{}:{}: longer than {} bytes, which no row of numbers is", path_, line_, kLongestLine));
+      throw ConfigError("{}:{}: longer than {} bytes, which no row of numbers is", path_, line_, kLongestLine);
     text.append(rest.substr(0, length));
     begin_ += std::min(length + 1, rest.size());
     if (length < rest.size()) return true;

@@ -49,6 +49,7 @@ std::string InstalledSchema() {
 
 std::string FindModelFile(const std::string& task, const std::string& name, const std::string& named_by) {
   std::vector<fs::path> directories = InstalledDirectories();
+  // A model beside the task goes before one of the same name that is installed.
   directories.insert(directories.begin(), fs::path(task).parent_path());
   std::vector<std::string> neighbours;
   std::error_code error;
@@ -60,8 +61,8 @@ std::string FindModelFile(const std::string& task, const std::string& name, cons
   std::ranges::sort(neighbours);
   std::string where;
   for (const fs::path& directory : directories) where += (where.empty() ? "" : " nor in ") + PlaceOf(directory);
-  throw ConfigError(named_by + name + " is not in " + where +
-                    (neighbours.empty() ? "" : "; " + Suggestion(name, neighbours)));
+  throw ConfigError("{}{} is not in {}{}", named_by, name, where,
+                    neighbours.empty() ? "" : "; " + Suggestion(name, neighbours));
 }
 
 }  // namespace forereach

@@ -41,7 +41,7 @@ std::vector<std::string> ReadAngles(const Field& model) {
 void RequireStates(const Field& model, const std::vector<std::string>& states) {
   for (const std::string& name : ReadAngles(model))
     if (std::ranges::find(states, name) == states.end())
-      model.Fail("angles", name + " is no state; " + Suggestion(name, states));
+      model.Fail("angles", fmt::format("{} is no state; {}", name, Suggestion(name, states)));
 }
 
 const std::vector<Named<const NamedModel*>>& Models() {
@@ -65,7 +65,7 @@ ModelText::Parameter ReadModelParameter(const Field& at) {
   if (at.name() != kStepName) return parameter;
   if (at.Count() != 0) at.Fail("is a list, has to be one number: the step is exact");
   if (!kStep.Contains(parameter.lower))
-    at.Fail(ToText(parameter.lower) + " is outside " + kStep.text() + ", its unit is s");
+    at.Fail(fmt::format("{} is outside {}, its unit is s", ToText(parameter.lower), kStep.text()));
   return parameter;
 }
 
@@ -100,9 +100,10 @@ class TextReader final {
   void Take(const std::string& map, const Field& entry) {
     const std::string& name = entry.name();
     if (IsReserved(name))
-      entry.Fail(name + (name == "pi" ? " is a number" : " is a function") + " of the language; choose another name");
+      entry.Fail(fmt::format("{}{} of the language; choose another name", name,
+                             name == "pi" ? " is a number" : " is a function"));
     const auto [other, is_new] = meanings_.emplace(name, map);
-    if (!is_new) entry.Fail("is a name of model." + other->second + " already; choose another name");
+    if (!is_new) entry.Fail(fmt::format("is a name of model.{} already; choose another name", other->second));
   }
 
   void ReadVariables(const std::string& map, int most, std::vector<ModelText::Variable>& variables) {
@@ -116,8 +117,8 @@ class TextReader final {
     if (&variables == &text_.states) return;
     for (const ModelText::Variable& state : text_.states)  // a column of transitions
       if (const std::string next = state.name + kNextEnding; meanings_.contains(next))
-        model_[meanings_[next]].Fail(next,
-                                     "is the column of the state " + state.name + " after a step; choose another name");
+        model_[meanings_[next]].Fail(
+            next, fmt::format("is the column of the state {} after a step; choose another name", state.name));
   }
 
   void ReadParameters() {
@@ -156,7 +157,7 @@ void Override(const Field& model, ModelText& text) {
   for (const Field& at : model.Entries("parameters")) {
     const auto parameter = std::ranges::find(text.parameters, at.name(), &ModelText::Parameter::name);
     if (parameter == text.parameters.end())
-      at.Fail("is not a parameter of " + text.file + "; " + Suggestion(at.name(), known));
+      at.Fail(fmt::format("is not a parameter of {}; {}", text.file, Suggestion(at.name(), known)));
     *parameter = ReadModelParameter(at);
   }
 }
@@ -233,7 +234,7 @@ void ReadTiming(const Field& at, TaskDraft& draft) {
   StepTiming& timing = draft.problem.timing;
   const auto index = [&](const Field& of, const std::string& name) {
     const auto found = std::ranges::find(states, name);
-    if (found == states.end()) of.Fail(name + " is no state; " + Suggestion(name, states));
+    if (found == states.end()) of.Fail(fmt::format("{} is no state; {}", name, Suggestion(name, states)));
     return static_cast<int>(found - states.begin());
   };
   if (at.Has("set_at_steps"))

@@ -15,12 +15,14 @@ namespace {
 const Config& WithLaws(const Config& config) {
   if (config.laws.stop.empty())
     throw ConfigError(
-        config.path + ": planner.stop: missing: how the robot brakes, an expression for each input, for example {" +
-        config.problem->model->input_names()[0] + ": ...}; `forereach init` writes it for the models of the library");
+        "{}: planner.stop: missing: how the robot brakes, an expression for each input, for example {{{}: "
+        "...}}; `forereach init` writes it for the models of the library",
+        config.path, config.problem->model->input_names()[0]);
   if (!config.laws.at_rest)
-    throw ConfigError(config.path +
-                      ": planner.at_rest: missing: it says where a braking tail ends; by default where task.rest does, "
-                      "which is missing, too");
+    throw ConfigError(
+        "{}: planner.at_rest: missing: it says where a braking tail ends; by default where task.rest does, "
+        "which is missing, too",
+        config.path);
   return config;
 }
 
@@ -29,8 +31,10 @@ Box ControlsOf(const Problem& problem) {
   const Eigen::VectorXd& error = problem.declaration.input_error;
   for (Eigen::Index i = 0; i < error.size(); ++i) {
     if (!(error[i] > 0)) continue;
+    // The input that acts is within this error of the plan's, and has to be inside the domain, too.
     lower[i] = AddUp(lower[i], error[i]);
     upper[i] = SubDown(upper[i], error[i]);
+    // An error that is wider than the box leaves its middle: the certifier refuses such a plan and says why.
     if (lower[i] > upper[i]) lower[i] = upper[i] = lower[i] / 2 + upper[i] / 2;
   }
   return {lower, upper};

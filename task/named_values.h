@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <stdexcept>
-#include <string>
 #include <string_view>
 #include <vector>
+
+#include <fmt/core.h>
 
 namespace forereach::key_rows {
 
@@ -26,7 +27,7 @@ std::vector<std::string_view> NamesIn(const std::vector<Named<T>>& all) {
 template <class T>
 const T& ValueNamed(const std::vector<Named<T>>& all, std::string_view name) {
   const auto found = std::ranges::find(all, name, &Named<T>::name);
-  if (found == all.end()) throw std::logic_error("a word that the schema does not have: " + std::string(name));
+  if (found == all.end()) throw std::logic_error(fmt::format("a word that the schema does not have: {}", name));
   return found->value;
 }
 

@@ -35,8 +35,9 @@ void CheckGate(const Field& at, TaskDraft& draft) {
   constexpr double kTimeouts = 1.5;
   const GateOptions& gate = draft.config.gate;
   if (gate.obstacles_lost_ms && *gate.obstacles_lost_ms < kTimeouts * gate.obstacles_timeout_ms)
-    at.Fail("obstacles_lost_ms", ToText(*gate.obstacles_lost_ms) + " is less than " + ToText(kTimeouts) +
-                                     " times gate.obstacles_timeout_ms, " + ToText(gate.obstacles_timeout_ms));
+    at.Fail("obstacles_lost_ms",
+            fmt::format("{} is less than {} times gate.obstacles_timeout_ms, {}", ToText(*gate.obstacles_lost_ms),
+                        ToText(kTimeouts), ToText(gate.obstacles_timeout_ms)));
 }
 
 std::vector<Key> GateKeys() {
@@ -149,7 +150,7 @@ void RequireDifferentChannels(const Field& at, TaskDraft& draft) {
   std::set<std::string> names;
   for (const ChannelRow& channel : kChannels)
     if (const std::string& name = draft.config.bus.*channel.member; !names.insert(name).second)
-      at.Fail(channel.name, name + " is the name of another channel too");
+      at.Fail(channel.name, fmt::format("{} is the name of another channel too", name));
 }
 
 std::vector<Key> BusKeys() {
@@ -253,7 +254,7 @@ Key WithinDeclared(const OptionRows<RobotOptions>& robot, const char* name, std:
   key.read = [=, read = key.read](const Field& at, TaskDraft& draft) {
     read(at, draft);
     if (draft.config.robot.*kind != "none" && !is_declared(draft.problem.declaration))
-      at.Fail(draft.config.robot.*kind + ", and declaration." + bounds_name + " allows for none");
+      at.Fail(fmt::format("{}, and declaration.{} allows for none", draft.config.robot.*kind, bounds_name));
   };
   return key;
 }
@@ -266,7 +267,7 @@ Key RobotJitter(const OptionRows<RobotOptions>& robot) {
   key.read = [read = key.read](const Field& at, TaskDraft& draft) {
     read(at, draft);
     if (draft.config.robot.step_jitter != "none" && StepErrorUs(draft.config.gate).value_or(0) == 0)
-      at.Fail(draft.config.robot.step_jitter + ", and robot.step_error_ms allows for none");
+      at.Fail(fmt::format("{}, and robot.step_error_ms allows for none", draft.config.robot.step_jitter));
   };
   return key;
 }
@@ -297,7 +298,7 @@ std::string StandingOfNamedModels() {
   for (const NamedModel& model : NamedModels()) {
     std::string states;
     for (const std::string_view state : model.standing) states += (states.empty() ? "" : " and ") + std::string(state);
-    text += (text.empty() ? "; " : ", ") + states + " of " + std::string(model.name);
+    text += fmt::format("{}{} of {}", text.empty() ? "; " : ", ", states, model.name);
   }
   return text;
 }
@@ -314,7 +315,7 @@ std::vector<Key> RobotKeys() {
               "The states that become zero while the robot stands and holds its position. `[]`, for one that cannot "
               "stand: it keeps its state. Planner and simulated robot require this, or task.rest with a model as text.",
               [](const Field& at, TaskDraft& draft) { draft.config.robot.hold = at.Names(); }),
-          "those of task.rest with a model as text" + StandingOfNamedModels()),
+          fmt::format("those of task.rest with a model as text{}", StandingOfNamedModels())),
       Optional(
           Map("robot.emergency_stop",
               "How the robot comes to rest by itself. The guard computes from it how many steps a stop takes, and "
@@ -366,7 +367,8 @@ std::vector<Key> RobotKeys() {
 void CheckLogger(const Field& at, TaskDraft& draft) {
   const LoggerOptions& logger = draft.config.logger;
   if (logger.quota_mb && *logger.quota_mb < logger.rotate_mb)
-    at.Fail("quota_mb", ToText(*logger.quota_mb) + " is less than logger.rotate_mb, " + ToText(logger.rotate_mb));
+    at.Fail("quota_mb",
+            fmt::format("{} is less than logger.rotate_mb, {}", ToText(*logger.quota_mb), ToText(logger.rotate_mb)));
 }
 
 std::vector<Key> LoggerKeys() {

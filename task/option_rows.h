@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "forereach/numerics/text.h"
 #include "task/draft.h"
 #include "task/key_rows.h"
@@ -46,7 +48,7 @@ class OptionRows final {
   /** The path of a file or directory. */
   Key File(const char* name, std::string Options::*member, std::string meaning) const {
     Key key = Text(name, member, std::move(meaning));
-    if (!key.fallback.empty()) key.fallback = "`" + key.fallback + "` in the working directory";
+    if (!key.fallback.empty()) key.fallback = fmt::format("`{}` in the working directory", key.fallback);
     key.read = [part = part_, member](const Field& at, TaskDraft& draft) { part(draft).*member = PathIn(at); };
     return key;
   }

@@ -147,7 +147,7 @@ Ring Bridged(std::vector<Ring> rings) {
   for (Ring& hole : rings) {
     std::rotate(hole.begin(), hole.begin() + (rightmost(hole) - hole.cbegin()), hole.end());
     const auto at = Seen(joined, hole.front(), sides);
-    if (!at) Refuse("the hole at " + ToText(hole.front()) + " is not inside");
+    if (!at) Refuse(fmt::format("the hole at {} is not inside", ToText(hole.front())));
     hole.push_back(hole.front());
     hole.push_back(joined[*at]);
     sides.push_back({hole.front(), joined[*at], 0, 0});
@@ -181,12 +181,14 @@ std::vector<Ring> Triangles(Ring ring) {
     i %= ring.size();
     const bool is_ear = IsEar(ring, i);
     if (is_ear) triangles.push_back({ring[(i + ring.size() - 1) % ring.size()], ring[i], ring[(i + 1) % ring.size()]});
+    // A ring has an ear, unless flat corners are in the way: after a turn without one, these go. A turn more, and it is
+    // no area.
     if (is_ear || (tried >= ring.size() && IsFlat(ring, i))) {
       ring.erase(ring.begin() + static_cast<std::ptrdiff_t>(i));
       tried = 0;
       ++i;  // not always at the same corner, from which a fan of slivers would come
     } else {
-      if (++tried > 2 * ring.size()) Refuse("its rings do not bound an area, near " + ToText(ring[i]));
+      if (++tried > 2 * ring.size()) Refuse(fmt::format("its rings do not bound an area, near {}", ToText(ring[i])));
       ++i;
     }
   }

@@ -122,7 +122,7 @@ void RequireFinite(const Field& at, const GrowingDisturbance& growing, const Tas
     if (const Interval& range = unbounded->second[l]; range.lower != domain[l].lower || range.upper != domain[l].upper)
       place += fmt::format("{} {} {:.4g}", place.empty() ? " near" : ",", draft.scope.variables[l], range.Middle());
   at.Fail(draft.scope.states[ToSize(unbounded->first)],
-          "has to have a finite value everywhere in the domain's box, and nothing bounds it" + place);
+          fmt::format("has to have a finite value everywhere in the domain's box, and nothing bounds it{}", place));
 }
 
 // By names: numbers and expressions.
@@ -141,7 +141,7 @@ void ReadDisturbance(const Field& at, TaskDraft& draft) {
     } else if (kNotNegative.Contains(number.value)) {
       declaration.disturbance[k] = number.value;
     } else {
-      bound.Fail(bound.Text() + " is outside " + kNotNegative.text());
+      bound.Fail(fmt::format("{} is outside {}", bound.Text(), kNotNegative.text()));
     }
   }
   if (!grows) return;
@@ -156,14 +156,15 @@ void ReadDisturbance(const Field& at, TaskDraft& draft) {
 // A bound on the error of what is recorded: by names, then one name, then the vector.
 std::array<Key, 3> ErrorKeys(const std::string& of, Key::Size size, Eigen::VectorXd Declaration::*errors,
                              std::vector<std::string> SchemaScope::*names, std::string meaning) {
-  const std::string path = "declaration." + of + "_error", unit = "of the " + of;
+  const std::string path = "declaration." + of + "_error", unit = fmt::format("of the {}", of);
   const auto read_names = [=](const Field& at, TaskDraft& draft) {
     Eigen::VectorXd& read = draft.problem.declaration.*errors;
     read.setZero(std::ssize(draft.scope.*names));
     for (const Field& error : at.Entries()) read[IndexOf(draft.scope.*names, error.name())] = error.Number();
   };
-  return {Optional(Map(path, std::move(meaning), read_names), "not declared, " + of + "s are taken as exact"),
-          Number(path + ".<" + of + ">", unit, kNotNegative, "Of this " + of + ". One that is not named is exact."),
+  return {Optional(Map(path, std::move(meaning), read_names), fmt::format("not declared, {}s are taken as exact", of)),
+          Number(path + ".<" + of + ">", unit, kNotNegative,
+                 fmt::format("Of this {}. One that is not named is exact.", of)),
           Vector(path, unit, kNotNegative, size, "The same as a list.",
                  [=](const Field& at, TaskDraft& draft) { draft.problem.declaration.*errors = at.Vector(); })};
 }
@@ -243,7 +244,7 @@ void CheckRegions(const Field& at, TaskDraft& draft) {
     at.Fail(fmt::format("cut {}, has to be at most {} variables and {} cells", grid.SizeText(), Region::kMaxVariables,
                         Region::kMaxCells));
   if (const std::string coupled = FindCoupledRegion(draft.problem); !coupled.empty())
-    at.Fail("are bounded by a variable that a constraint beyond the box of the domain names: " + coupled);
+    at.Fail(fmt::format("are bounded by a variable that a constraint beyond the box of the domain names: {}", coupled));
   if (const std::string turning = FindTurningRegion(draft.problem); !turning.empty()) at.Fail(turning);
 }
 
@@ -368,8 +369,8 @@ void SetProjection(const Field& at, Eigen::MatrixXd projection, TaskDraft& draft
     if (projection.row(i).isZero(0)) at[i].Fail("is zero, which sees no state");
   for (const int angle : draft.problem.model->angles())
     if (!projection.col(angle).isZero(0))
-      at.Fail("depends on " + draft.scope.states[ToSize(angle)] +
-              ", which is one of model.angles: how often an angle has turned is not known");
+      at.Fail(fmt::format("depends on {}, which is one of model.angles: how often an angle has turned is not known",
+                          draft.scope.states[ToSize(angle)]));
   draft.scope.safety_dim = static_cast<int>(projection.rows());
   draft.problem.projection = std::move(projection);
 }
@@ -408,7 +409,7 @@ BodyPart ReadPart(const Field& at, Eigen::Index& size) {
   const bool has_points = shape.Has(in_frame);
   if (has_points == shape.Has(at_expressions))
     shape.Fail(has_points ? "has points in the robot's frame and at expressions; delete one of them"
-                          : "missing: " + in_frame + " or " + at_expressions);
+                          : fmt::format("missing: {} or {}", in_frame, at_expressions));
   BodyPart part{{}, shape.Has("radius") ? shape["radius"].Number() : 0, {}};
   const Field points = shape[has_points ? in_frame : at_expressions];
   for (const Field& which : is_disc ? std::vector{points} : points.Entries()) {

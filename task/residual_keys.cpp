@@ -1,6 +1,8 @@
 // The rows of residuals: `residual`, which `forereach declare` bounds, and `robot.residual`.
 #include <numbers>
 
+#include <fmt/core.h>
+
 #include "forereach/dynamics/angles.h"
 #include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/models/named_residuals.h"
@@ -46,7 +48,7 @@ std::vector<std::string_view> Names() {
 ModelText::Parameter& ParameterNamed(ResidualText& residual, std::string_view name) {
   const auto found = std::ranges::find(residual.parameters, name, &ModelText::Parameter::name);
   if (found == residual.parameters.end())
-    throw std::logic_error(residual.name + " has no parameter " + std::string(name));
+    throw std::logic_error(fmt::format("{} has no parameter {}", residual.name, name));
   return *found;
 }
 
@@ -82,8 +84,8 @@ void RequireNoJump(const NominalModel& model, const Box& states, const Parametri
     if (!(-std::numbers::pi <= states.lower()[angle] && states.upper()[angle] <= std::numbers::pi))
       turning.push_back(angle);
   for (std::size_t k = 0; k < residual.values.size(); ++k)
-    RequireSameAfterTurns(program, static_cast<int>(k), residual.values[k], "the residual of " + model.state_names()[k],
-                          turning, model.state_names());
+    RequireSameAfterTurns(program, static_cast<int>(k), residual.values[k],
+                          fmt::format("the residual of {}", model.state_names()[k]), turning, model.state_names());
 }
 
 // The residual at `path`. Its expressions are parsed here for the first time.
@@ -99,7 +101,7 @@ ParametricResidual ReadResidual(const Field& at, const Problem& problem) {
   } catch (const ExpressionError& error) {
     if (!is_named) FailAt(at.file(), error);
     if (error.word().empty()) at.Fail("name", error.what());
-    at.Fail("name", text.name + " uses " + error.word() + ", which " + model.name() + " does not have");
+    at.Fail("name", fmt::format("{} uses {}, which {} does not have", text.name, error.word(), model.name()));
   } catch (const std::invalid_argument& error) {
     (is_named ? at["name"] : at).Fail(error.what());
   }
@@ -108,7 +110,7 @@ ParametricResidual ReadResidual(const Field& at, const Problem& problem) {
 // Rows for the map `path`, each parameter a number or, if `with_ranges`, an interval.
 std::vector<Key> Rows(const std::string& path, std::vector<std::string_view> names, bool with_ranges) {
   const auto meaning_of = [&](const std::string& key, const std::string& meaning) {
-    return with_ranges ? meaning : "As `residual." + key + "`.";
+    return with_ranges ? meaning : fmt::format("As `residual.{}`.", key);
   };
   std::vector<Key> keys{Word(path + ".name", std::move(names),
                              meaning_of("name",

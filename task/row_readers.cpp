@@ -13,8 +13,8 @@
 namespace forereach::key_rows {
 
 void FailAt(const std::string& file, const ExpressionError& error) {
-  throw ConfigError(fmt::format("{}:{}:{}: {}{}", file, error.line(), error.column(), error.what(),
-                                error.word().empty() ? "" : "; " + Suggestion(error.word(), error.known())));
+  throw ConfigError("{}:{}:{}: {}{}", file, error.line(), error.column(), error.what(),
+                    error.word().empty() ? "" : "; " + Suggestion(error.word(), error.known()));
 }
 
 std::string PathIn(const Field& at) { return (std::filesystem::path(at.file()).parent_path() / at.Text()).string(); }
@@ -25,8 +25,8 @@ int IndexOf(const std::vector<std::string>& names, const std::string& name) {
 
 void RequireOrdered(const Field& lower, const Field& upper) {
   if (lower.Number() <= upper.Number()) return;
-  upper.Fail(ToText(upper.Number()) + " is outside " + Range{lower.Number(), kReal.upper, false, true}.text() +
-             ", below " + lower.key());
+  upper.Fail(fmt::format("{} is outside {}, below {}", ToText(upper.Number()),
+                         Range{lower.Number(), kReal.upper, false, true}.text(), lower.key()));
 }
 
 ModelText::Parameter ReadParameter(const Field& at) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <iterator>
 
+#include <fmt/core.h>
+
 #include "command_line/nearest.h"
 #include "forereach/numerics/text.h"
 #include "task/key_rows.h"
@@ -16,26 +18,26 @@ using Size = Key::Size;
 
 std::string Numbered(const char* what, Size size) {
   switch (size) {
-    case Size::kStates: return std::string(what) + ", one a state";
-    case Size::kInputs: return std::string(what) + ", one an input";
-    case Size::kVariables: return std::string(what) + ", one a state and input";
-    case Size::kSafety: return std::string(what) + ", one a safety coordinate";
-    case Size::kPoint: return "2 or 3 " + std::string(what);
+    case Size::kStates: return fmt::format("{}, one a state", what);
+    case Size::kInputs: return fmt::format("{}, one an input", what);
+    case Size::kVariables: return fmt::format("{}, one a state and input", what);
+    case Size::kSafety: return fmt::format("{}, one a safety coordinate", what);
+    case Size::kPoint: return fmt::format("2 or 3 {}", what);
     case Size::kAny: break;
   }
   return what;
 }
 
-std::string CountText(const Range& count) { return ToText(count.lower) + " to " + ToText(count.upper); }
+std::string CountText(const Range& count) { return fmt::format("{} to {}", ToText(count.lower), ToText(count.upper)); }
 
 std::string TypeText(const Key& key) {
   switch (key.type) {
     case Type::kMap: return "map";
-    case Type::kList: return "list of " + CountText(key.count);
+    case Type::kList: return fmt::format("list of {}", CountText(key.count));
     case Type::kNumber: return "number";
     case Type::kInteger: return "integer";
     case Type::kVector: return Numbered("numbers", key.size);
-    case Type::kVectors: return CountText(key.count) + " lists of " + Numbered("numbers", key.size);
+    case Type::kVectors: return fmt::format("{} lists of {}", CountText(key.count), Numbered("numbers", key.size));
     case Type::kNames:
       return CountText(key.count) + (key.size == Size::kStates ? " names of states" : " names of states and inputs");
     case Type::kWord: return (key.words.size() > 1 ? "one of " : "") + Joined({key.words.begin(), key.words.end()});
@@ -58,7 +60,7 @@ std::string RangeText(const Key& key) {
     text = (key.size == Size::kAny ? " in " : ", in ") + key.range.text();
   const bool is_of_each = key.size == Size::kStates || key.size == Size::kInputs;  // "numbers, one a state"
   if (key.unit.empty() || (key.unit.starts_with("of ") && is_of_each)) return text;
-  return text + (key.unit.starts_with("of ") ? ", unit " : text.empty() ? ", " : " ") + key.unit;
+  return fmt::format("{}{}{}", text, key.unit.starts_with("of ") ? ", unit " : text.empty() ? ", " : " ", key.unit);
 }
 
 // Whether a row is the second form of the number before it: the least and the largest value.
@@ -67,9 +69,9 @@ bool IsRangeOf(const Key& number, const Key& key) {
 }
 
 std::string DefaultText(const Key& key) {
-  const std::string whose = key.only.empty() ? "" : " for " + key.only;
-  if (key.required) return ", required" + whose;
-  return key.fallback.empty() ? "" : ", default" + whose + ": " + key.fallback;
+  const std::string whose = key.only.empty() ? "" : fmt::format(" for {}", key.only);
+  if (key.required) return fmt::format(", required{}", whose);
+  return key.fallback.empty() ? "" : fmt::format(", default{}: {}", whose, key.fallback);
 }
 
 std::vector<Key> MakeSchema(std::initializer_list<std::vector<Key> (*)()> parts) {
@@ -92,7 +94,7 @@ std::span<const Key> ModelFileSchema() {
 
 std::string Range::text() const {
   std::string text = lower_open ? "(" : "[";
-  text += ToText(lower) + ", " + ToText(upper);
+  text += fmt::format("{}, {}", ToText(lower), ToText(upper));
   return text + (upper_open ? ")" : "]");
 }
 
@@ -107,9 +109,9 @@ std::string SchemaMarkdown() {
     const Key& key = keys[i];
     if (IsRangeOf(keys[i - 1], key)) continue;
     const bool may_be_range = i + 1 < keys.size() && IsRangeOf(key, keys[i + 1]);
-    if (key.path.find('.') == std::string::npos) text += "\n### " + key.path + "\n\n";
-    text += "- `" + key.path + "`: " + TypeText(key) + RangeText(key) + (may_be_range ? ", or [least, largest]" : "") +
-            DefaultText(key) + ". " + key.meaning + "\n";
+    if (key.path.find('.') == std::string::npos) text += fmt::format("\n### {}\n\n", key.path);
+    text += fmt::format("- `{}`: {}{}{}{}. {}\n", key.path, TypeText(key), RangeText(key),
+                        may_be_range ? ", or [least, largest]" : "", DefaultText(key), key.meaning);
   }
   return text;
 }

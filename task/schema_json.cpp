@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <set>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "task/json_text.h"
@@ -117,8 +118,8 @@ Json FormJson(std::span<const Key> schema, const Key& key) {
 
 std::string DescriptionOf(const Key& key) {
   std::string text = key.meaning;
-  if (!key.unit.empty()) text += " Unit: " + key.unit + ".";
-  if (!key.fallback.empty()) text += " Default: " + key.fallback + ".";
+  if (!key.unit.empty()) text += fmt::format(" Unit: {}.", key.unit);
+  if (!key.fallback.empty()) text += fmt::format(" Default: {}.", key.fallback);
   return text;
 }
 

@@ -32,6 +32,8 @@ std::int64_t StepUs(const Config& config) { return std::llround(config.period * 
 double StepErrorSeconds(const Config& config) {
   const std::optional<std::int64_t> error_us = StepErrorUs(config.gate);
   if (!error_us || (*error_us == 0 && StepSeconds(config) == config.period)) return 0;
+  // model.dt need not be a whole number of microseconds, by which guards count: over a plan the difference adds up
+  // (docs/soundness.md, 3.15).
   const Interval differs = Interval(static_cast<double>(StepUs(config))) / Interval(1e6) - Interval(config.period);
   return AddUp(SecondsUp(*error_us), MulUp(kMaxSteps, differs.Magnitude()));
 }

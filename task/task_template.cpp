@@ -23,7 +23,8 @@ std::string List(const std::vector<std::string>& entries) {
 std::string NamesWithUnits(const std::vector<TemplateVariable>& variables) {
   std::string text;
   for (const TemplateVariable& variable : variables)
-    text += (text.empty() ? "" : ", ") + variable.name + (variable.unit.empty() ? "" : " (" + variable.unit + ")");
+    text += fmt::format("{}{}{}", text.empty() ? "" : ", ", variable.name,
+                        variable.unit.empty() ? "" : fmt::format(" ({})", variable.unit));
   return text.empty() ? "none" : text;
 }
 
@@ -56,10 +57,11 @@ std::string DomainKey(const TaskTemplate& task) {
                     : "PLACEHOLDER: put in what your robot does.\n";
   text += "domain:\n";
   const auto box = [&](const char* map, const std::vector<TemplateVariable>& variables) {
-    text += std::string("  ") + map + ":  # " + NamesWithUnits(variables) + "\n";
-    text += "    lower: " + Numbers(variables, [](const auto& v) { return v.lower; }) + "  # the least value of each\n";
-    text +=
-        "    upper: " + Numbers(variables, [](const auto& v) { return v.upper; }) + "  # the largest value of each\n";
+    text += fmt::format("  {}:  # {}\n", map, NamesWithUnits(variables));
+    text += fmt::format("    lower: {}  # the least value of each\n",
+                        Numbers(variables, [](const auto& v) { return v.lower; }));
+    text += fmt::format("    upper: {}  # the largest value of each\n",
+                        Numbers(variables, [](const auto& v) { return v.upper; }));
   };
   box("state", task.states);
   box("input", task.inputs);
@@ -70,32 +72,29 @@ std::string DeclarationKey(const TaskTemplate& task) {
   std::vector<std::string> columns;
   for (const auto* variables : {&task.states, &task.inputs})
     for (const TemplateVariable& variable : *variables) columns.push_back(variable.name);
-  std::string text =
+  std::string text = fmt::format(
       "# The declaration: how much the robot's error of one step (true next state minus that of the model) can change "
       "from one\n"
       "# place to another. Every certificate rests on it; nothing here can prove it for you. One row for each state, "
       "one number\n"
-      "# for each of " +
-      NamesWithUnits(task.states) + "; " + NamesWithUnits(task.inputs) +
-      ":\n"
+      "# for each of {}; {}:\n"
       "# the change of the row's error for a change of 1 in that column.\n"
       "# PLACEHOLDER: all ones. They allow so much that hardly any plan can be certified; with your numbers it becomes "
       "possible.\n"
       "declaration:\n"
-      "  lipschitz:\n";
+      "  lipschitz:\n",
+      NamesWithUnits(task.states), NamesWithUnits(task.inputs));
   for (const TemplateVariable& state : task.states)
-    text += "    - " + List(std::vector<std::string>(columns.size(), "1")) + "  # " + state.name + "\n";
-  text +=
+    text += fmt::format("    - {}  # {}\n", List(std::vector<std::string>(columns.size(), "1")), state.name);
+  text += fmt::format(
       "  # The largest error of each successor in the data. PLACEHOLDER. If sensors err by up to e, add the line\n"
       "  # state_error: [e, ...]. It counts for the states before the steps, too.\n"
-      "  noise_bound: " +
-      List(std::vector<std::string>(task.states.size(), "0.01")) +
-      "\n"
-      "  # How far the true state may be from the one that the robot measures while it drives, by names, such as {" +
-      task.states.front().name +
-      ": 0.01}.\n"
+      "  noise_bound: {}\n"
+      "  # How far the true state may be from the one that the robot measures while it drives, by names, such as {{{}: "
+      "0.01}}.\n"
       "  # PLACEHOLDER: exact, as the simulated robot measures it.\n"
-      "  state_error: {}\n";
+      "  state_error: {{}}\n",
+      List(std::vector<std::string>(task.states.size(), "0.01")), task.states.front().name);
   return text;
 }
 
@@ -105,18 +104,19 @@ std::string TransitionsKey(const TaskTemplate& task) {
       "later, in\n"
       "# columns that end in _next. They are what the certifier knows of the robot beside the declaration.\n";
   if (!task.transitions_exist)
-    text +=
+    text += fmt::format(
         "# This file is not there yet. Record it, or make it with the simulated robot, which is the model itself "
         "unless\n"
         "# robot.residual says more:\n"
-        "#   forereach-robot-sim --config " +
-        task.path + " --make-transitions " + task.transitions + " --seed 1 --count 400\n";
-  return text + "transitions: " + YamlText(task.transitions) + "\n";
+        "#   forereach-robot-sim --config {} --make-transitions {} --seed 1 --count 400\n",
+        task.path, task.transitions);
+  return fmt::format("{}transitions: {}\n", text, YamlText(task.transitions));
 }
 
 std::string Bounds(const std::vector<std::pair<std::string, double>>& bounds) {
   std::string text;
-  for (const auto& [name, bound] : bounds) text += (text.empty() ? "" : ", ") + name + ": " + ToText(bound);
+  for (const auto& [name, bound] : bounds)
+    text += fmt::format("{}{}: {}", text.empty() ? "" : ", ", name, ToText(bound));
   return "{" + text + "}";
 }
 
@@ -130,18 +130,20 @@ std::vector<std::pair<std::string, double>> Rest(const TaskTemplate& task) {
 
 std::string RestKey(const TaskTemplate& task) {
   if (const auto rest = Rest(task); !rest.empty())
-    return "  # What standing is: each plan that is certified on the bus has to end with no more than this. "
-           "PLACEHOLDER.\n"
-           "  rest: " +
-           Bounds(rest) + "\n";
+    return fmt::format(
+        "  # What standing is: each plan that is certified on the bus has to end with no more than this. PLACEHOLDER.\n"
+        "  rest: {}\n",
+        Bounds(rest));
   if (task.laws)
-    return "  # There is no `rest`: this robot cannot stand, and plans end in motion. " + task.laws->task +
-           "\n"
-           "  # says what that means.\n";
-  return "  # What standing is. Name the velocities; each plan that is certified on the bus then has to end with no "
-         "more:\n"
-         "  # rest: {" +
-         task.states.back().name + ": 0.05}\n";
+    return fmt::format(
+        "  # There is no `rest`: this robot cannot stand, and plans end in motion. {}\n"
+        "  # says what that means.\n",
+        task.laws->task);
+  return fmt::format(
+      "  # What standing is. Name the velocities; each plan that is certified on the bus then has to end with no "
+      "more:\n"
+      "  # rest: {{{}: 0.05}}\n",
+      task.states.back().name);
 }
 
 // A place along the domain, given by its share.
@@ -168,9 +170,9 @@ std::string ExampleObstacle(const TaskTemplate& task, const std::vector<std::str
   }
   const auto first = std::ranges::find(task.states, positions.front(), &TemplateVariable::name);
   if (positions.size() == 2)
-    return "circle: {center: " + List(center) +
-           ", radius: " + RoundedUp(kShare * (first->upper - first->lower), kTemplateDigits) + "}";
-  return "box: {lower: " + List(lower) + ", upper: " + List(upper) + "}";
+    return fmt::format("circle: {{center: {}, radius: {}}}", List(center),
+                       RoundedUp(kShare * (first->upper - first->lower), kTemplateDigits));
+  return fmt::format("box: {{lower: {}, upper: {}}}", List(lower), List(upper));
 }
 
 std::string TaskKey(const TaskTemplate& task, const std::vector<std::string>& positions) {
@@ -179,35 +181,28 @@ std::string TaskKey(const TaskTemplate& task, const std::vector<std::string>& po
     center.push_back(ToText(task.center[k]));
     half_width.push_back("0.01");
   }
-  std::string text =
+  std::string text = fmt::format(
       "# What `forereach certify` is asked.\n"
       "task:\n"
       "  # Where the robot may be when a plan begins: the estimate, and how far off it may be. PLACEHOLDER.\n"
-      "  initial_set:  # " +
-      NamesWithUnits(task.states) +
-      "\n"
-      "    center: " +
-      List(center) +
-      "\n"
-      "    half_width: " +
-      List(half_width) +
-      "\n"
+      "  initial_set:  # {}\n"
+      "    center: {}\n"
+      "    half_width: {}\n"
       "  # The states that are the robot's position: obstacles are given in these coordinates. The robot is a point "
       "there; give\n"
       "  # it a shape with `body` (config/README.md).\n"
-      "  projection: " +
-      List(positions) +
-      "\n"
+      "  projection: {}\n"
       "  # A certificate holds at the samples only. For all times between them declare how sharply the motion bends "
       "there,\n"
-      "  # `between: {acceleration: [...]}`.\n"
-      "  between: samples\n";
+      "  # `between: {{acceleration: [...]}}`.\n"
+      "  between: samples\n",
+      NamesWithUnits(task.states), List(center), List(half_width), List(positions));
   text += RestKey(task);
-  text +=
+  text += fmt::format(
       "  # What the robot must not touch. PLACEHOLDER: one obstacle, as an example.\n"
       "  obstacles:\n"
-      "    - " +
-      ExampleObstacle(task, positions) + "\n";
+      "    - {}\n",
+      ExampleObstacle(task, positions));
   return text;
 }
 
@@ -217,11 +212,12 @@ std::string EmergencyStop(const TaskTemplate& task, const std::vector<std::strin
   for (const std::string& name : Velocities(task.states))
     if (std::ranges::find(held, name) != held.end()) rates.emplace_back(name, 1);
   if (rates.empty()) return "";
-  return "  # How fast its brakes take each of them to zero whatever happens, in its unit per second. PLACEHOLDER: "
-         "what your robot\n"
-         "  # surely does. Stops begin the earlier the less it is.\n"
-         "  emergency_stop: " +
-         Bounds(rates) + "\n";
+  return fmt::format(
+      "  # How fast its brakes take each of them to zero whatever happens, in its unit per second. PLACEHOLDER: what "
+      "your robot\n"
+      "  # surely does. Stops begin the earlier the less it is.\n"
+      "  emergency_stop: {}\n",
+      Bounds(rates));
 }
 
 std::string RobotKey(const TaskTemplate& task) {
@@ -231,62 +227,60 @@ std::string RobotKey(const TaskTemplate& task) {
       "robot:\n"
       "  # How far its steps are from their times, ms; `forereach doctor` measures it. PLACEHOLDER: nobody looks.\n"
       "  step_error_ms: any\n";
-  if (task.laws || !held.empty()) return text + "  hold: " + List(held) + "\n" + EmergencyStop(task, held);
+  if (task.laws || !held.empty()) return fmt::format("{}  hold: {}\n{}", text, List(held), EmergencyStop(task, held));
   held = {task.states.back().name};
-  return text + "#   hold: " + List(held) +
-         "\n"
-         "#   emergency_stop: " +
-         Bounds({{held[0], 1}}) + "  # how fast its brakes take it to zero, in its unit per second\n";
+  return fmt::format(
+      "{}#   hold: {}\n"
+      "#   emergency_stop: {}  # how fast its brakes take it to zero, in its unit per second\n",
+      text, List(held), Bounds({{held[0], 1}}));
 }
 
 std::string PlannerKey(const TaskTemplate& task, const std::vector<std::string>& positions) {
-  const std::string goal = "goal: " + PlaceAt(0.65, task, positions);
+  const std::string goal = fmt::format("goal: {}", PlaceAt(0.65, task, positions));
   const std::vector<std::pair<std::string, double>> rest = Rest(task);
   if (!task.laws)
-    return "# The planner: how the robot stops, an expression of the state for each input, clipped to domain.input, "
-           "and where it is\n"
-           "# at rest. docs/planner.md explains them. The planner starts when these lines are there.\n"
-           "# planner:\n"
-           "#   " +
-           goal +
-           "\n"
-           "#   stop: {" +
-           task.inputs.front().name + ": -" + (rest.empty() ? task.states.back().name : rest.front().first) +
-           "/dt}  # and each other input\n"
-           "#   at_rest: {" +
-           (rest.empty() ? task.states.back().name : rest.front().first) + ": 0.005}\n";
-  std::string text =
+    return fmt::format(
+        "# The planner: how the robot stops, an expression of the state for each input, clipped to domain.input, and "
+        "where it is\n"
+        "# at rest. docs/planner.md explains them. The planner starts when these lines are there.\n"
+        "# planner:\n"
+        "#   {}\n"
+        "#   stop: {{{}: -{}/dt}}  # and each other input\n"
+        "#   at_rest: {{{}: 0.005}}\n",
+        goal, task.inputs.front().name, rest.empty() ? task.states.back().name : rest.front().first,
+        rest.empty() ? task.states.back().name : rest.front().first);
+  std::string text = fmt::format(
       "# The planner: how the robot stops and is steered. These laws are those of\n"
-      "#   " +
-      task.laws->task +
-      "\n"
+      "#   {}\n"
       "# docs/planner.md explains them.\n"
       "planner:\n"
       "  # Where to go, in the coordinates of task.projection. The planner plans once there is a goal.\n"
-      "  # " +
-      goal + "\n" + task.laws->lines;
+      "  # {}\n"
+      "{}",
+      task.laws->task, goal, task.laws->lines);
   if (task.laws->has_at_rest) return text;
   std::string at_rest;
   for (const auto& [name, bound] : rest)
-    at_rest += (at_rest.empty() ? "" : ", ") + name + ": " + ToThreeDigits(bound / 10);
-  return text +
-         "  # Where a plan ends, by the model. Less than task.rest, since what is not known of the robot comes on "
-         "top.\n"
-         "  at_rest: {" +
-         at_rest + "}\n";
+    at_rest += fmt::format("{}{}: {}", at_rest.empty() ? "" : ", ", name, ToThreeDigits(bound / 10));
+  return fmt::format(
+      "{}  # Where a plan ends, by the model. Less than task.rest, since what is not known of the robot comes on top.\n"
+      "  at_rest: {{{}}}\n",
+      text, at_rest);
 }
 
 std::string Processes(const TaskTemplate& task, const std::vector<std::string>& positions) {
-  return "# The certifier on the bus: where the obstacles come from. bus: those above and those that a sender repeats; "
-         "nothing is\n"
-         "# certified while none is heard, and plans under way are withdrawn once they have been unknown for\n"
-         "# obstacles_lost_ms. task: those above are all there are.\n"
-         "gate: {obstacles: bus, obstacles_lost_ms: 2000}\n"
-         "\n" +
-         PlannerKey(task, positions) + "\n" + RobotKey(task) +
-         "\n"
-         "# The directory of recorded runs.\n"
-         "logger: {directory: log}\n";
+  return fmt::format(
+      "# The certifier on the bus: where the obstacles come from. bus: those above and those that a sender repeats; "
+      "nothing is\n"
+      "# certified while none is heard, and plans under way are withdrawn once they have been unknown for\n"
+      "# obstacles_lost_ms. task: those above are all there are.\n"
+      "gate: {{obstacles: bus, obstacles_lost_ms: 2000}}\n"
+      "\n"
+      "{}\n"
+      "{}\n"
+      "# The directory of recorded runs.\n"
+      "logger: {{directory: log}}\n",
+      PlannerKey(task, positions), RobotKey(task));
 }
 
 constexpr double kLargest = std::numeric_limits<double>::max();
@@ -326,19 +320,22 @@ std::string YamlText(const std::string& text) {
 
 std::string TaskText(const TaskTemplate& task) {
   const std::vector<std::string> positions = PositionStates(task.states);
-  return (task.schema.empty() ? "" : "# yaml-language-server: $schema=" + task.schema + "\n") +
-         "# The task of a robot, begun by\n"
-         "#   " +
-         task.command +
-         "\n"
-         "# config/README.md describes every key. Go through the lines that say PLACEHOLDER, then let\n"
-         "#   forereach check " +
-         task.path +
-         "\n"
-         "# say what is still missing.\n"
-         "\n" +
-         task.model + "\n" + DomainKey(task) + "\n" + DeclarationKey(task) + "\n" + TransitionsKey(task) + "\n" +
-         TaskKey(task, positions) + "\n" + Processes(task, positions);
+  return fmt::format(
+      "{}# The task of a robot, begun by\n"
+      "#   {}\n"
+      "# config/README.md describes every key. Go through the lines that say PLACEHOLDER, then let\n"
+      "#   forereach check {}\n"
+      "# say what is still missing.\n"
+      "\n"
+      "{}\n"
+      "{}\n"
+      "{}\n"
+      "{}\n"
+      "{}\n"
+      "{}",
+      task.schema.empty() ? "" : fmt::format("# yaml-language-server: $schema={}\n", task.schema), task.command,
+      task.path, task.model, DomainKey(task), DeclarationKey(task), TransitionsKey(task), TaskKey(task, positions),
+      Processes(task, positions));
 }
 
 }  // namespace forereach

@@ -56,8 +56,8 @@ std::optional<WrappedAngle> FindWrappedAngle(const NominalModel& model, const Tr
 void RequireNoWrappedAngle(const std::string& config, const std::string& path, const NominalModel& model,
                            const Transitions& transitions) {
   if (const auto wrapped = FindWrappedAngle(model, transitions))
-    throw ConfigError(
-        fmt::format("{}: model.angles: {}:{}: {}; {}", config, path, wrapped->row + 2, wrapped->what, wrapped->advice));
+    throw ConfigError("{}: model.angles: {}:{}: {}; {}", config, path, wrapped->row + 2, wrapped->what,
+                      wrapped->advice);
 }
 
 }  // namespace forereach

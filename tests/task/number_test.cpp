@@ -1,7 +1,5 @@
 #include "task/number.h"
 
-#include <clocale>
-
 #include "tests/test.h"
 
 namespace forereach::number_test {
