@@ -70,6 +70,8 @@ Numbers NumbersOf(const BusId& bus, std::uint64_t sender, std::int64_t counter) 
 Covered ToSign(const std::string& robot, Role role, const Numbers& numbers, const std::string& channel, Bytes message) {
   Covered covered;
   covered.Append(kSignatureContext);
+  // Robot, role, bus, sender, counter and channel are all signed: none of them can be exchanged, nor the message sent
+  // on another channel.
   covered.Append(DigestOf(robot));
   covered.Append(BigEndian(static_cast<std::uint8_t>(role)));
   covered.Append(numbers);
@@ -215,6 +217,7 @@ std::pair<Authenticity, Bytes> Authenticator::Check(const std::string& channel, 
 
 // @pre it has a trailer, which anybody may have written.
 std::int64_t Authenticator::Apart(Bytes bytes, std::int64_t now_us) {
+  // A counter is any number, and no difference of two may overflow.
   constexpr std::int64_t kMost = INT64_MAX / 4;
   return std::clamp(Trailer(bytes).counter(), -kMost, kMost) - std::clamp(now_us, -kMost, kMost);
 }
@@ -242,6 +245,7 @@ Authenticity Authenticator::Classify(const std::string& name, Bytes bytes, std::
   if (bus_ && trailer.bus() != *bus_) return Authenticity::kForeign;
   if (const Authenticity timely = Timeliness(channel, trailer, now_us); timely != Authenticity::kAuthentic)
     return timely;
+  // Who has the group key can make tags, and each false signature under one costs as much as a true one.
   if (keys_.HoldsGroup() && IsDoubted(trailer.tag)) return Authenticity::kForged;
   const Covered covered = ToSign(keys_.robot(), channel.speaker, trailer.numbers, name, trailer.message);
   if (!keys_.IsSigned(channel.speaker, covered.bytes(), trailer.signature)) {
@@ -249,6 +253,7 @@ Authenticity Authenticator::Classify(const std::string& name, Bytes bytes, std::
     return Authenticity::kForged;
   }
   if (!Take(channel, trailer)) return Authenticity::kReplayed;
+  // Readers of a log take the bus from its first authentic message.
   if (!bus_) bus_ = trailer.bus();
   return Authenticity::kAuthentic;
 }
@@ -291,6 +296,7 @@ bool Authenticator::IsDoubted(const GroupTag& tag) const {
 void Authenticator::CountTry(const GroupTag& tag) {
   auto doubt = std::ranges::find(doubts_, tag, &Doubt::tag);
   if (doubt == doubts_.end()) {
+    // The oldest gives its place: a flood of tags forgets doubts, and grows nothing.
     doubt = doubts_.begin() + static_cast<std::ptrdiff_t>(next_doubt_++ % doubts_.size());
     *doubt = {tag, 0};
   }

@@ -35,6 +35,7 @@ class InboxBus : public Bus {
   }
   int Dispatch(int timeout_ms) override {
     const int calls = HandOut(timeout_ms);
+    // Only by a caller that has time to wait.
     if (timeout_ms > 0) inbox_.GiveBack();
     return calls;
   }
@@ -129,13 +130,15 @@ class MulticastBus final : public InboxBus {
 std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock, const std::shared_ptr<Screen>& screen) {
   if (url.starts_with("memq://")) return std::make_unique<MemoryBus>(std::move(clock), screen);
   if (!url.starts_with("udpm://"))
-    throw BusError("bus: " + url + " has to begin with udpm:// or memq://, as in udpm://239.255.76.67:7667?ttl=0");
+    throw BusError(
+        fmt::format("bus: {} has to begin with udpm:// or memq://, as in udpm://239.255.76.67:7667?ttl=0", url));
   try {
     return std::make_unique<MulticastBus>(ParseMulticastUrl(url), screen);
   } catch (const std::system_error& error) {
-    throw BusError("bus: cannot open " + url + ": " + error.what() +
-                   ". Is there a multicast route? `ip link set lo up; ip route add 224.0.0.0/4 dev lo` as root; "
-                   "`forereach doctor` checks it");
+    throw BusError(
+        fmt::format("bus: cannot open {}: {}. Is there a multicast route? `ip link set lo up; ip route add 224.0.0.0/4 "
+                    "dev lo` as root; `forereach doctor` checks it",
+                    url, error.what()));
   }
 }
 

@@ -26,6 +26,7 @@ Datagram ParseDatagram(Bytes bytes) noexcept {
   if (BeginsWith(bytes, kFragment)) return {DatagramKind::kFragment, {}, {}};
   if (!BeginsWith(bytes, kShortMessage)) return {DatagramKind::kNotLcm, {}, {}};
   const Bytes rest = bytes.subspan(kDatagramHeaderBytes);
+  // A name may fill the whole datagram; beyond the longest that is allowed nothing is looked at.
   const Bytes head = rest.first(std::min(rest.size(), kMaxChannelBytes + 1));
   const auto end = std::ranges::find(head, 0);
   if (end == head.end()) return {DatagramKind::kUnterminatedName, {}, {}};

@@ -98,6 +98,7 @@ int Inbox::HandOut(int timeout_ms) {
         subscription->handler({stored.channel, raw.subspan(stored.message_begin, stored.message_bytes), stored.utime,
                                raw, stored.sender});
       } catch (...) {
+        // One handler's failure must not cost the others their messages. The last one is thrown at the end.
         failure = std::current_exception();
       }
     }

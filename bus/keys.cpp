@@ -248,6 +248,7 @@ void ReadPublicKeys(LineReader& reader, KeyRing::Content& content, std::optional
     const PublicKey key = reader.KeyOf(field);
     if (own == role && key != content.public_keys[At(role)])
       reader.Complain(field + ": is not that of the secret in line 4");
+    // A role with another's key could speak for it.
     for (std::size_t other = 0; other < At(role); ++other)
       if (content.public_keys[other] == key) reader.Complain(field + ": is another role's key too");
     if (own && At(*own) > At(role) && key == content.public_keys[At(*own)])
@@ -292,6 +293,7 @@ bool IsDirectory(const std::string& path) {
 // Checks the open file, so that the checked file is the one that is read.
 KeyFile Load(const std::string& path) {
   RequireSodium(path);
+  // Opening a pipe or a terminal neither waits nor becomes this process's own.
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) FailSystem(path, "cannot be read");
@@ -423,6 +425,7 @@ class KeyDirectory final {
   }
 
   void Exchange() const {
+    // In one step: at no time is there a directory with keys of both.
     if (::renameat2(parent_->get(), other_.c_str(), parent_->get(), name_.c_str(), RENAME_EXCHANGE) != 0)
       FailSystem(path_, "cannot be exchanged for " + other_path() +
                             ", which needs a file system that exchanges directories in one step");

@@ -55,6 +55,7 @@ void RunNode(Node& node, Bus& bus) {
     service.SayAlive();
   }
   service.SayStops();
+  // What has come by now is still answered.
   bus.Dispatch(0);
   node.Stop();
 }

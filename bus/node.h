@@ -3,8 +3,6 @@ the wall clock. A test or a one-process run drives several nodes on a simulated 
 #pragma once
 
 #include <cstdint>
-#include <functional>
-#include <memory>
 #include <string>
 
 #include "bus/bus.h"

@@ -124,7 +124,8 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
   const Command program{
       .name = description.name,
       .purpose = description.purpose,
-      .footer = "Example:\n  " + description.example + "\n\nThe keys of a task file are explained in config/README.md.",
+      .footer = fmt::format("Example:\n  {}\n\nThe keys of a task file are explained in config/README.md.",
+                            description.example),
       .options = std::move(options)};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   SetUpLog(description.name);
@@ -138,7 +139,7 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
     if (!channels.keys) logging::Warn(kUnsignedWarning);
     logging::Info("ready on {} with {}{}", channels.url, config_path,
                   channels.keys
-                      ? ", signed as the " + std::string(RoleName(description.role)) + " of " + channels.keys->robot()
+                      ? fmt::format(", signed as the {} of {}", RoleName(description.role), channels.keys->robot())
                       : "");
     DatagramWatch watched(*node, *bus);
     RunNode(watched, *bus);

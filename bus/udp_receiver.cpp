@@ -125,6 +125,7 @@ void UdpReceiver::ReceiveOne(std::uint8_t* buffer, std::size_t bytes) {
   }
   if (truncated || datagram.kind != DatagramKind::kMessage) return;
   const std::int64_t utime = std::int64_t{stamp.tv_sec} * 1'000'000 + stamp.tv_usec;
+  // The kernel's stamp, at which the datagram arrived: a thread that waits for its turn does not make a message old.
   deliver_(datagram.channel, datagram.payload, stamp.tv_sec > 0 ? utime : WallClockUs());
 }
 

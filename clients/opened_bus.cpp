@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "bus/log.h"
 #include "bus/process.h"
 
@@ -36,10 +38,12 @@ Bus& OpenedBus::bus() const {
 }
 
 void OpenedBus::Send(const std::string& channel, Bytes message) const {
-  if (!bus().Publish(channel, message)) throw std::runtime_error(channel + ": the bus does not take the message");
+  if (!bus().Publish(channel, message))
+    throw std::runtime_error(fmt::format("{}: the bus does not take the message", channel));
 }
 
 void OpenedBus::Listen(std::int64_t until_utime, const std::function<bool()>& done) const {
+  // What has come by now is handed out also if there is no time to wait.
   bus().Dispatch(0);
   for (std::int64_t left; !done() && (left = until_utime - WallClockUs()) > 0;)
     around_([&] { bus_->Dispatch(static_cast<int>((std::min(left, kWaitUs) + 999) / 1000)); });

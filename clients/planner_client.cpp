@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/stamp.h"
 #include "clients/opened_bus.h"
@@ -16,6 +18,7 @@ namespace {
 
 template <class Message>
 void Keep(std::deque<Message>& waiting, const Message& message) {
+  // Whoever never asks does not grow without bound.
   waiting.push_back(message);
   if (waiting.size() > PlannerClient::kMostWaiting) waiting.pop_front();
 }
@@ -26,21 +29,20 @@ void RequireThat(bool holds, const std::string& what) {
 
 void RequireStart(const CandidateStart& start, int num_states) {
   RequireThat(start.center.size() == num_states && start.half_width.size() == num_states,
-              "initial set: " + std::to_string(start.center.size()) + " and " +
-                  std::to_string(start.half_width.size()) + " entries, the model has " + std::to_string(num_states) +
-                  " states");
+              fmt::format("initial set: {} and {} entries, the model has {} states", start.center.size(),
+                          start.half_width.size(), num_states));
   RequireThat(start.center.allFinite() && start.half_width.allFinite() && (start.half_width.array() >= 0).all(),
               "initial set: its numbers must be finite, and its half-widths not negative");
 }
 
 void RequireControls(const Eigen::MatrixXd& controls, int num_inputs, std::optional<int> progress) {
   RequireThat(controls.rows() == num_inputs,
-              "plan: " + std::to_string(controls.rows()) + " inputs, the model has " + std::to_string(num_inputs));
+              fmt::format("plan: {} inputs, the model has {}", controls.rows(), num_inputs));
   RequireThat(controls.cols() >= 1 && controls.cols() <= kMaxSteps,
-              "plan: " + std::to_string(controls.cols()) + " steps, must be 1 to " + std::to_string(kMaxSteps));
+              fmt::format("plan: {} steps, must be 1 to {}", controls.cols(), kMaxSteps));
   RequireThat(controls.allFinite(), "plan: a control is not a number that is finite, must be finite");
   RequireThat(!progress || (*progress >= 0 && *progress <= controls.cols()),
-              "progress_steps: " + std::to_string(progress.value_or(0)) + ", must be 0 to the steps of the plan");
+              fmt::format("progress_steps: {}, must be 0 to the steps of the plan", progress.value_or(0)));
 }
 
 }  // namespace
@@ -59,6 +61,7 @@ struct PlannerClient::Core {
 
   void Hear(const advice_t& message) {
     const candidate_plan_t& plan = message.proposal;
+    // ControlsOf reads the plan by its own sizes, so they are looked at first.
     const bool has_plan = HasSizes(plan, *opened.config().problem->model) && plan.progress_steps >= 0 &&
                           plan.progress_steps <= plan.num_steps;
     if (message.changed == 0)
@@ -84,6 +87,7 @@ struct PlannerClient::Core {
   std::deque<withdrawal_t> withdrawals;
   std::deque<advice_t> advice, repairs;
   std::optional<robot_state_t> state;
+  // The last: its handlers write what stands above.
   PlannerMessages messages;
 };
 
@@ -119,9 +123,9 @@ std::vector<std::int64_t> PlannerClient::ProposeMany(std::span<const Eigen::Matr
     numbers += static_cast<std::size_t>(plan.size());
   }
   RequireThat(!plans.empty(), "Us: has no plan");
+  // Send would leave out what has no room; whoever calls this wants all of them sent.
   RequireThat(plans.size() == 1 || (plans.size() <= kMaxBatch && numbers <= kMaxBatchNumbers),
-              "Us: at most " + std::to_string(kMaxBatch) + " plans and " + std::to_string(kMaxBatchNumbers) +
-                  " numbers fit into one message");
+              fmt::format("Us: at most {} plans and {} numbers fit into one message", kMaxBatch, kMaxBatchNumbers));
   const auto sent = core_->messages.Send(start, plans, request.repair, WallClockUs());
   if (sent.size() < plans.size()) throw std::runtime_error("the bus does not take the candidates");
   std::vector<std::int64_t> plan_ids;

@@ -37,6 +37,7 @@ void PlannerMessages::HearStates(const std::string& channel, Handler<robot_state
   bus_.Subscribe(channel, [this, handle = std::move(handler)](const Received& received) {
     const auto state = Decoded<robot_state_t>(received.bytes);
     const SoleSender::Place place = robot_.Hear(received.sender, received.utime);
+    // Whoever takes over counts its states anew.
     if (place == SoleSender::Place::kTakesOver) states_ = {};
     if (place != SoleSender::Place::kOther && state &&
         TakeState(*state, config_.problem->model->num_states(), received.utime, config_.gate, states_))

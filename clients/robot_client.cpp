@@ -42,6 +42,7 @@ RobotClient::RobotClient(const Config& task, const ClientOptions& instead, Robot
                          const std::function<void(const std::function<void()>&)>& around)
     : core_(std::make_unique<Core>(OpenedBus(task, Role::kRobot, instead, around), robot)) {}
 
+// The robot may outlive its client, and then has no bus to send over.
 RobotClient::~RobotClient() { core_->robot.bus_ = nullptr; }
 
 const Problem& RobotClient::problem() const { return *core_->opened.config().problem; }

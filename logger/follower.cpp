@@ -7,8 +7,6 @@
 #include <system_error>
 #include <vector>
 
-#include <fmt/core.h>
-
 #include <sys/prctl.h>
 #include <unistd.h>
 
@@ -22,7 +20,7 @@ std::string FleetProgram() {
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
   const std::string program = (self.parent_path() / FOREREACH_FLEET).lexically_normal().string();
   if (error || access(program.c_str(), X_OK) != 0)
-    throw ConfigError(fmt::format("--database: {} is not there: it is in the package forereach-fleet", program));
+    throw ConfigError("--database: {} is not there: it is in the package forereach-fleet", program);
   return program;
 }
 
@@ -49,9 +47,10 @@ void StartFollower(const std::string& directory, const std::string& database, co
   std::vector<char*> arguments;
   for (std::string& each : command) arguments.push_back(each.data());
   arguments.push_back(nullptr);
+  // A process of its own: a database that does not answer must not hold up the log.
   const pid_t parent = getpid(), child = fork();
   if (child == 0) Become(arguments.data(), parent);
-  if (child < 0) throw ConfigError(fmt::format("--database: no process can be started: {}", std::strerror(errno)));
+  if (child < 0) throw ConfigError("--database: no process can be started: {}", std::strerror(errno));
 }
 
 }  // namespace forereach

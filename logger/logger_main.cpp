@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
     try {
       node = std::make_unique<LoggerNode>(chosen, bus, std::cout);
     } catch (const BadInput& error) {
-      throw ConfigError(std::string("logger.directory: ") + error.what());
+      throw ConfigError("logger.directory: {}", error.what());
     }
     if (!database.empty()) StartFollower(chosen.logger.directory, database, robot);
     return node;

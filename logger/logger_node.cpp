@@ -40,12 +40,14 @@ void LoggerNode::Receive(const Received& received) {
       return;
     }
   }
+  // Its own heartbeat is no sign that others are heard.
   if (received.channel != channels_.logger_status) last_heard_us_ = now_us_;
   if (queue_.size() < queue_size_) {
     queue_.push_back({-1, received.utime, received.channel, {received.raw.begin(), received.raw.end()}});
     return;
   }
   Stream stream = recorder_.interpreter().Identify(received.channel, WithoutSignature(received.raw)).first;
+  // Anybody may invent streams; those beyond are counted together.
   if (overflow_.size() >= kMaxStreamsInOverflow && !overflow_.contains(stream)) stream = {"*", ""};
   ++overflow_[stream];
 }
@@ -83,6 +85,7 @@ void LoggerNode::Tick(std::int64_t now_us) {
 }
 
 void LoggerNode::Drain(std::int64_t now_us) {
+  // Before the losses: what was queued had come before what found no room.
   for (; !queue_.empty(); queue_.pop_front()) recorder_.Take(std::move(queue_.front()), now_us);
   for (const auto& [stream, lost] : std::exchange(overflow_, {})) recorder_.Lose(stream, lost, now_us, "queue");
   if (unsigned_lost_ > 0) recorder_.Lose({"*", ""}, std::exchange(unsigned_lost_, 0), now_us, "unsigned");
@@ -113,9 +116,9 @@ void LoggerNode::SendStatus(std::int64_t now_us, std::int64_t queue_depth) {
   status.failed_flushes = static_cast<std::int16_t>(recorder_.failed_flushes());
   SetText(status.message, !trouble.empty()            ? trouble
                           : !silence.empty()          ? silence
-                          : !recorder_.gone().empty() ? "recording; " + recorder_.gone()
-                          : !refused.empty()          ? "recording; not authentic and in no row: " + refused
-                                                      : "recording");
+                          : !recorder_.gone().empty() ? fmt::format("recording; {}", recorder_.gone())
+                          : !refused.empty() ? fmt::format("recording; not authentic and in no row: {}", refused)
+                                             : "recording");
   bus_.Publish(channels_.logger_status, status);
 }
 

@@ -15,7 +15,6 @@ have their number. Messages of other channels above the limit become gaps "unsig
 #include <iosfwd>
 #include <map>
 #include <string>
-#include <vector>
 
 #include "bus/bus.h"
 #include "bus/node.h"

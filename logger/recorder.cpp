@@ -59,6 +59,7 @@ Rows WithoutEvents(Rows rows) {
 template <class Counts>
 std::pair<std::string, Stream> KeyIn(const Counts& counts, const std::string& reason, const Stream& stream) {
   std::pair key{reason, stream};
+  // Names of channels are whatever is sent, so they must not fill the memory.
   if (counts.size() >= kMaxLosses && !counts.contains(key)) key.second = {"*", ""};
   return key;
 }
@@ -143,7 +144,7 @@ void Recorder::Recover(const RunRow& run) {
       return;
     }
   database_->EndRun(run.log_file, end_utime, text);
-  recovered_.push_back(run.log_file + ": " + text);
+  recovered_.push_back(fmt::format("{}: {}", run.log_file, text));
   logging::Warn("recovered {}", recovered_.back());
 }
 
@@ -168,6 +169,7 @@ std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
     interpreter.Observe(event, rows);
     const bool is_found_again = rows.gaps.size() > gaps && !known.contains(event.number);
     if (is_found_again && !IsMore(rows.gaps.back(), counted)) rows.gaps.pop_back();
+    // The database has its rows; it is read for the interpreter's state alone.
     if (event.number < run.events) rows = {};
     events = std::max(run.events, event.number + 1);
     if (++unwritten >= kEventsPerTransaction) write();
@@ -220,6 +222,7 @@ void Recorder::Open(std::int64_t now_us, const std::string& continues) {
     directory_.Remove(file);  // it is empty and belongs to no run
     throw;
   }
+  // What the file that is gone has not taken is not lost.
   if (log_ && log_->pending_bytes() > 0) log->TakeOver(*log_);
   log_ = std::move(log);
   log_file_ = file;
@@ -275,7 +278,7 @@ void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
   try {
     const Config config = LoadConfig(task_path_);
     if (config.grounds.config != heard.first)
-      throw ConfigError(task_path_ + " is another, of config digest " + ToHex(config.grounds.config));
+      throw ConfigError("{} is another, of config digest {}", task_path_, ToHex(config.grounds.config));
     AddTask(config);
     KeepTasks();
   } catch (const BadInput& error) {
@@ -313,7 +316,7 @@ void Recorder::Rotate(std::int64_t now_us) {
     WatchDisk(now_us);  // the ended file may now be deleted for the quota
     rotation_problem_.clear();
   } catch (const BadInput& error) {
-    rotation_problem_ = std::string("no new log file: ") + error.what();
+    rotation_problem_ = fmt::format("no new log file: {}", error.what());
     retry_.Start(now_us);
   }
 }
@@ -445,7 +448,7 @@ void Recorder::StartAnew(std::int64_t now_us) {
       CountLoss({channel, ""}, events, now_us, "gone");
     rows_ = WithoutEvents(std::move(rows_));
     pause_ = "gone";
-    anew_problem_ = std::string("the log is gone, and there is no new one: ") + error.what();
+    anew_problem_ = fmt::format("the log is gone, and there is no new one: {}", error.what());
     anew_.Start(now_us);
   }
 }
@@ -455,7 +458,7 @@ void Recorder::WatchDatabase(std::int64_t now_us) {
     const std::optional<std::string> displaced = database_->FindDisplaced();
     if (!displaced) return;
     logging::Error("database: {}; it is opened again", *displaced);
-    database_problem_ = displaced_ = "database: " + *displaced;
+    database_problem_ = displaced_ = fmt::format("database: {}", *displaced);
     database_->Checkpoint();
     database_.reset();
   }
@@ -477,7 +480,7 @@ void Recorder::OpenDatabaseAnew() {
   if (run == runs.end()) database->BeginRun(log_file_, begun_us_, continues_, robot());
   database_ = std::move(database);
   if (!lacks_rows) return;
-  gone_ = displaced_ + ", with the gaps that only it held";
+  gone_ = fmt::format("{}, with the gaps that only it held", displaced_);
   rows_lost_ = needs_new_file_ = true;
   are_rows_behind_ |= std::ranges::any_of(directory_.Logs(), [&](const std::string& log) {
     return log == log_file_ || std::ranges::find(runs, log, &RunRow::log_file) == runs.end();
@@ -530,6 +533,7 @@ void Recorder::WriteRows() {
     flushed_rows_ = {};
     told_events_ = events;
   } else if (flushed_rows_.size() > kMaxWaitingRows) {
+    // The log has the events, so the next start makes their rows; of gaps nothing else knows.
     rows_lost_ = true;
     flushed_rows_ = {{}, {}, MergedWithoutEvents(flushed_rows_.gaps), {}};
   }
@@ -543,7 +547,7 @@ std::string Recorder::trouble() const {
   if (!database_) return database_problem_;
   if (!flushed_rows_.empty()) return database_->problem();
   if (rows_lost_ || are_rows_behind_) return "rows are missing in the database, the next start makes them again";
-  if (is_log_hidden_) return "whether " + log_path_ + " is in its place cannot be seen";
+  if (is_log_hidden_) return fmt::format("whether {} is in its place cannot be seen", log_path_);
   return rotation_problem_;
 }
 
@@ -615,6 +619,7 @@ bool Recorder::MakeRoom(std::int64_t bytes, std::int64_t now_us) {
     std::ranges::stable_sort(ended, {}, &Ended::start_utime);  // an old log may have got its run late
     for (const auto& [start_utime, file, size] : ended) {
       if (HasRoom(bytes)) break;
+      // Marked first: readers tell a log that was deleted for the quota from one that is gone.
       database().MarkLogDeleted(file, now_us);
       earlier_files_.erase(file);
       if (!directory_.Remove(file)) continue;

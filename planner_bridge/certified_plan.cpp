@@ -39,6 +39,7 @@ class PlanSearch final {
       PlanRequest request{start, lessons_.clearance(), lessons_.DomainMargin(half_width_, config_.problem->projection),
                           seed_++, attempt};
       request.limit_margin = lessons_.limit_margin();
+      // The hints give the same plan each time.
       request.may_follow_hints = attempt == 0;
       request.schedule = schedule_;
       request.initial_set = initial_set_;
@@ -58,6 +59,7 @@ class PlanSearch final {
         return true;
       }
       if (before == 0) found_.decision = decision;
+      // No other plan is certified either.
       if (decision.outcome == Outcome::kFalsified) return false;
       lessons_.Learn(decision);
     }

@@ -10,6 +10,7 @@ namespace forereach {
 void Lessons::Learn(const Decision& decision) {
   const auto limit = static_cast<std::size_t>(decision.coordinate);
   const double beyond = std::abs(decision.margin - decision.threshold);
+  // More distance from anything helps against neither.
   if (decision.cause == Cause::kNoStop || decision.cause == Cause::kBetween) return;
   if (decision.outcome == Outcome::kDomain) ++domain_exits_;
   if (decision.outcome == Outcome::kSafety && decision.cause != Cause::kLimit) clearance_ += step_;
@@ -33,6 +34,7 @@ bool Lessons::HeedChange(const advice_change_t& change) {
       if (obstacle_clearance_.size() <= index) obstacle_clearance_.resize(index + 1);
       ObstacleClearance& own = obstacle_clearance_[index];
       const bool is_first = own.clearance == 0;
+      // An advice says how far the body's middle has to keep away, or only how much was missing.
       const double before = is_first ? 0 : own.clearance + change.value;
       const double told = is_distance(change.clearance) ? change.clearance : clearance_ + change.value;
       own.clearance = std::max(before, told);
@@ -50,6 +52,7 @@ bool Lessons::HeedChange(const advice_change_t& change) {
 
 void Lessons::Ease() {
   for (ObstacleClearance& own : obstacle_clearance_)
+    // A search that finds nothing may have been told too much.
     if (own.clearance > clearance_) own.clearance = own.clearance / 2 + clearance_ / 2;
   for (auto& [k, more] : state_margin_) more /= 2;
 }

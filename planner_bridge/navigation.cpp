@@ -1,7 +1,6 @@
 #include "planner_bridge/navigation.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <queue>
@@ -65,6 +64,7 @@ void NavigationField::March(const std::vector<double>& slowness) {
   std::vector<bool> settled(slowness.size());
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> front;
   const Eigen::Vector2d end = origin_ + cell_ * Eigen::Vector2d(columns_ - 1, rows_ - 1);
+  // A goal outside the region draws to the place of the region that is nearest to it.
   const Eigen::Vector2d source = goal_.head<2>().cwiseMax(origin_).cwiseMin(end);
   for (int k = 0; k < columns_ * rows_; ++k) {
     const double distance = (NodeAt(k) - source).norm();
@@ -97,6 +97,7 @@ double NavigationField::Solve(int index, double slowness) const {
   };
   const double a = std::min(at(i - 1, j), at(i + 1, j)), b = std::min(at(i, j - 1), at(i, j + 1));
   const double h = slowness * cell_, nearer = std::min(a, b), difference = std::abs(a - b);
+  // The front comes from one side only.
   if (!(difference < h)) return nearer + h;
   return (a + b + std::sqrt(2 * h * h - difference * difference)) / 2;
 }

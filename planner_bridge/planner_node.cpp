@@ -34,8 +34,7 @@ Eigen::VectorXd HalfWidth(const Config& config) {
   const std::vector<double>& given = config.planner.initial_half_width;
   const int n = config.problem->model->num_states();
   if (std::ssize(given) != n)
-    throw ConfigError(
-        fmt::format("{}: planner.initial_half_width: {} entries, it has to have {}", config.path, given.size(), n));
+    throw ConfigError("{}: planner.initial_half_width: {} entries, it has to have {}", config.path, given.size(), n);
   return Eigen::Map<const Eigen::VectorXd>(given.data(), n);
 }
 
@@ -60,6 +59,7 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
 
 void PlannerNode::Tick(std::int64_t now_us) {
   if (!round_ || round_->awaited_plan >= 0) return;
+  // The certifier certifies nothing while it does not know them.
   if (!obstacles_.WhyUnknown(now_us).empty()) return EndRound(false);
   if (round_->unadvised && now_us < round_->advice_until) return;
   LearnWithoutAdvice();
@@ -96,6 +96,7 @@ void PlannerNode::Follow(const robot_state_t& state) {
   last_state_ = state;
   finished_ = state.mode == robot_state_t::FINISHED;
   arrived_ = arrived_ || IsAtGoal(state);
+  // A plan that would start in the past is refused by everybody.
   if (round_ && (arrived_ || finished_ || round_->start.utime <= state.utime)) EndRound(false);
   if (waiting_start_ && *waiting_start_ <= state.utime) waiting_start_.reset();
   if (state.mode == robot_state_t::EXECUTING)
@@ -232,6 +233,7 @@ int PlannerNode::StepsBack() {
   stuck_at_ = place_;
   const int most = kMaxSteps - options.tail_steps;
   int steps = std::min(options.progress_steps, most);
+  // Near the same place it was not enough the last time.
   for (int i = 0; i < doublings_ && 2 * steps <= most; ++i) steps *= 2;
   const int least = steps;
   while (steps + options.progress_steps <= most && !HasRoomFurtherBack(steps)) steps += options.progress_steps;
@@ -296,6 +298,7 @@ void PlannerNode::EndRound(bool certified) {
   } else {
     ++fruitless_rounds_;
     if (round_->searches > 0 && ++lost_in_a_row_ == kLostRounds) LogLostRounds();
+    // From the same place the hints give the plan that was refused.
     refused_center_ = round_->start.center;
   }
   round_.reset();
@@ -408,6 +411,7 @@ void PlannerNode::OnDecision(const decision_t& decision, std::int64_t now_us) {
     return;
   }
   const std::int64_t first = std::exchange(round_->awaited_plan, -1);
+  // One decision answers a batch: its other plans are never certified.
   std::erase_if(plans_, [&](const auto& plan) {
     return first <= plan.first && plan.first - first < round_->awaited && plan.first != decision.plan_id;
   });

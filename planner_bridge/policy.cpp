@@ -1,10 +1,8 @@
 #include "planner_bridge/policy.h"
 
 #include <fstream>
-#include <iterator>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "forereach/numerics/limits.h"
@@ -23,7 +21,7 @@ constexpr const char* kActivation = "tanh";
 constexpr int kVersion = 1, kLargestLayer = 1024, kMostSizes = 9;
 
 void RequireText(const JsonField& field, const std::string& text) {
-  if (field.Text() != text) field.Fail(field.Text() + " has to be " + text);
+  if (field.Text() != text) field.Fail(fmt::format("{} has to be {}", field.Text(), text));
 }
 
 std::vector<std::size_t> ReadSizes(const JsonField& field) {
@@ -91,13 +89,15 @@ std::string Lines(const Policy& policy) {
             {"output", ToJson(policy.output)}};
   for (const Policy::Layer& layer : policy.layers) head["sizes"].push_back(layer.bias.size());
   std::string text = "{\n";
-  for (const auto& [name, value] : head.items()) text += JsonText(Json(name)) + ": " + JsonText(value) + ",\n";
+  for (const auto& [name, value] : head.items())
+    text += fmt::format("{}: {},\n", JsonText(Json(name)), JsonText(value));
   text += "\"layers\": [\n";
   for (const Policy::Layer& layer : policy.layers) {
     text += "{\"weight\": [\n";
     for (Eigen::Index i = 0; i < layer.weight.rows(); ++i)
       text += JsonText(ToJson(Eigen::VectorXd(layer.weight.row(i)))) + (i + 1 < layer.weight.rows() ? ",\n" : "],\n");
-    text += "\"bias\": " + JsonText(ToJson(layer.bias)) + (&layer == &policy.layers.back() ? "}]\n" : "},\n");
+    text +=
+        fmt::format("\"bias\": {}{}", JsonText(ToJson(layer.bias)), &layer == &policy.layers.back() ? "}]\n" : "},\n");
   }
   return text + "}\n";
 }
@@ -108,6 +108,7 @@ Eigen::MatrixXd Policy::Act(const Eigen::VectorXd& features) const {
   Eigen::VectorXd h = (features - input.offset).cwiseQuotient(input.scale);
   for (const Layer& layer : layers) {
     h = (layer.weight * h + layer.bias).eval();
+    // The last layer is linear: its outputs are scaled to controls.
     if (&layer != &layers.back()) h = h.array().tanh();
   }
   h = output.offset + output.scale.cwiseProduct(h);
@@ -120,14 +121,14 @@ Policy LoadPolicy(const std::string& path) try {
 } catch (const ConfigError& error) {
   throw PolicyError(error.what());
 } catch (const nlohmann::json::exception& error) {
-  throw PolicyError(path + ": " + DescribeJsonError(error));
+  throw PolicyError(fmt::format("{}: {}", path, DescribeJsonError(error)));
 }
 
 void SavePolicy(const std::string& path, const Policy& policy) {
   std::ofstream file(path);
   file << Lines(policy);
   file.close();
-  if (!file) throw PolicyError(path + ": cannot be written");
+  if (!file) throw PolicyError(fmt::format("{}: cannot be written", path));
 }
 
 }  // namespace forereach

@@ -6,7 +6,6 @@ output.scale * (W_L h_{L-1} + b_L). reference.h defines the features of the bicy
 guarantee; they are only candidates. */
 #pragma once
 
-#include <span>
 #include <string>
 #include <vector>
 

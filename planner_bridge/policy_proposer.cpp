@@ -29,13 +29,13 @@ double WheelbaseOf(const NominalModel& model) {
 }
 
 void Require(bool holds, const std::string& what) {
-  if (!holds) throw std::invalid_argument("planner.policy: " + what);
+  if (!holds) throw std::invalid_argument(fmt::format("planner.policy: {}", what));
 }
 
 Policy Fitting(const Problem& problem, const PlannerOptions& options, Policy policy) {
   RequireGoalAndSteps(problem, options);
   const std::string model = problem.model->description();
-  Require(policy.model == model, "is for the model " + policy.model + ", the task's is " + model);
+  Require(policy.model == model, fmt::format("is for the model {}, the task's is {}", policy.model, model));
   Require(problem.model->state_names() == kCarStates && WheelbaseOf(*problem.model) > 0,
           "there are policies for cars only: states x, y, theta, v, a, delta, and a parameter wheelbase");
   Require(problem.projection == Eigen::MatrixXd::Identity(2, problem.model->num_states()),
@@ -111,6 +111,7 @@ std::vector<Proposal> PolicyProposer::ProposeMany(const PlanRequest& request) {
   if (options_.policy_samples == 1) return Proposer::ProposeMany(request);
   if (!CanServe(request)) return {};
   const int tails = motion_.num_tails(), samples = options_.policy_samples;
+  // Each block with each way to brake, and at least as many blocks as there are aims.
   const int blocks = std::max((samples + tails - 1) / tails, std::min(samples, 1 + kFan));
   std::mt19937_64 random(request.seed);
   const auto draw = [&](double least, double most) {

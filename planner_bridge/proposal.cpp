@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include <fmt/core.h>
 #include <ompl/base/Goal.h>
 #include <ompl/base/ProjectionEvaluator.h>
 #include <ompl/base/spaces/RealVectorStateSpace.h>
@@ -127,7 +128,7 @@ MakeAlgorithm AlgorithmNamed(const std::string& name) {
                                                                {"sst", Make<oc::SST>}};
   const auto found = algorithms.find(name);
   if (found == algorithms.end())
-    throw std::invalid_argument("planner.algorithm: " + name + " is not kpiece, est, pdst, rrt or sst");
+    throw std::invalid_argument(fmt::format("planner.algorithm: {} is not kpiece, est, pdst, rrt or sst", name));
   return found->second;
 }
 
@@ -264,6 +265,7 @@ class Planner final : public Proposer {
   // At a time: what is gone by then is not in the way.
   const NavigationField& Field(double clearance, std::int64_t time_us) {
     constexpr std::size_t kKept = 64;
+    // Clearances are learned, so their number has no bound of its own.
     if (fields_.size() > kKept) fields_.clear();
     const auto gone =
         std::ranges::count_if(obstacles_, [&](const Obstacle& obstacle) { return IsGone(obstacle, time_us); });
@@ -327,6 +329,7 @@ class Planner::ProposalSearch {
     const Box& box = planner.problem_->domain.state;
     const Eigen::VectorXd margin =
         request.domain_margin.size() == 0 ? Eigen::VectorXd::Zero(start_.size()) : request.domain_margin;
+    // A start that is within the margin stays allowed, as does all that is no nearer to the bound.
     lower_ = (box.lower() + margin).cwiseMin(start_).cwiseMax(box.lower());
     upper_ = (box.upper() - margin).cwiseMax(start_).cwiseMin(box.upper());
     const std::span<const double> x(start_.data(), n_);
@@ -349,6 +352,7 @@ class Planner::ProposalSearch {
     limit_margin_ = LimitMargin(request);
     start_distance_ = field.DistanceToGo(Position(x));
     gain_ = IdealGain();
+    // A robot that is already faster may slow down first.
     top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_.Speed(x));
     least_speed_ = std::min(-kReverse, planner.motion_.Speed(x));
     at_rest_ = planner.motion_.IsAtRest(x);

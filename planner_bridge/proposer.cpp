@@ -14,9 +14,9 @@ std::unique_ptr<Proposer> MakeProposer(const Config& config) try {
   const std::string& source = config.planner.source;
   if (source == "policy") return std::make_unique<PolicyProposer>(config, LoadPolicy(config.planner.policy));
   if (source == "ompl") return MakeOmplProposer(config);
-  throw std::invalid_argument("planner.source: " + source + " is not ompl or policy");
+  throw std::invalid_argument(fmt::format("planner.source: {} is not ompl or policy", source));
 } catch (const std::invalid_argument& error) {
-  throw ConfigError(config.path + ": " + error.what());
+  throw ConfigError("{}: {}", config.path, error.what());
 }
 
 void RequireGoalAndSteps(const Problem& problem, const PlannerOptions& options) {

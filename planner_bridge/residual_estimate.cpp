@@ -74,12 +74,14 @@ double ResidualEstimate::Estimate(int k, std::span<const double> z) const {
     return sum;
   }
   const auto slopes = problem_->declaration.lipschitz.row(k);
+  // Declared to be the same everywhere.
   if ((slopes.array() == 0).all()) return residuals_.col(k).mean();
   const Eigen::MatrixXd& points = problem_->transitions.z;
   std::array<Neighbour, kNearest> nearest;
   for (int i = 0; i < points.rows(); ++i) {
     double distance = 0;
     for (int l = 0; l < points.cols(); ++l)
+      // By what the residual may change over that way: the declaration's own distance.
       if (slopes(l) != 0) distance += slopes(l) * std::abs(z[static_cast<std::size_t>(l)] - points(i, l));
     Insert({distance, residuals_(i, k)}, nearest);
   }

@@ -29,6 +29,7 @@ void Brake::Apply(std::span<const double> before, double share, std::span<double
     const double decline = declines_[k];
     if (decline == 0) continue;
     const double left = std::isfinite(decline) ? std::abs(before[k]) - share * decline : 0;
+    // What is left by rounding alone is rest: else one more step would be braked for.
     x[k] = left > 1e-9 * decline ? std::copysign(left, before[k]) : 0;
   }
 }

@@ -19,6 +19,7 @@ namespace {
 
 constexpr std::size_t kMostExpected = 8;  // reloaded tasks without a plan yet
 constexpr Speaker kStarts{Role::kCertifier}, kStops{Role::kCertifier, kStopsAheadUs};
+// What a certified_plan_t has room for.
 constexpr int kMaxPlanStates = 16, kMaxPlanInputs = 8, kMaxPlanSteps = 128;
 
 // Empty without memory for it: a refusal keeps its cause.
@@ -277,6 +278,7 @@ void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std:
                    const std::optional<std::vector<int>>& angles) {
   RequireDomain(domain, options_);
   const auto known = angles ? std::optional(AnglesOf(*angles, options_.num_states)) : std::nullopt;
+  // A task that is expected again is the newest of them.
   std::erase_if(expected_,
                 [&](const Task& task) { return task.config == config_digest && task.model == model_digest; });
   // Reloads without a plan in between may be many; the newest are those that plans will name.
@@ -327,6 +329,7 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
     verdict = Examine(*certified, now_us);
     verdict.plan_id = certified->plan.plan_id;
     if (!verdict.ok()) return verdict;
+    // Nothing below throws: either all of these change, or the plan was refused.
     last_accepted_ = certified->plan.plan_id;
     last_expiry_ = std::max(last_expiry_, certified->expires_utime);
     TakeTaskOf(*certified);
@@ -386,6 +389,7 @@ GuardWithdrawal Guard::Withdraw(Bytes withdrawal_bytes, std::int64_t now_us) noe
 }
 
 void Guard::Take(const withdrawal_t& message, GuardWithdrawal& answer) {
+  // Who does not know the plan says nothing against it if both have decided on the same grounds.
   const auto counts = [&](const std::unique_ptr<certified_plan_t>& plan) {
     return plan && Names(message, *plan) &&
            !(message.cause == withdrawal_t::UNKNOWN_PLAN && RestsOn(*plan, GroundsOf(message)));
@@ -394,7 +398,9 @@ void Guard::Take(const withdrawal_t& message, GuardWithdrawal& answer) {
     const int valid = std::clamp<int>(message.valid_steps, 0, executing_->plan.num_steps);
     standing_steps_ = std::min(standing_steps_.value_or(valid), valid);
   }
+  // A pending plan needs all of its controls: it has not begun, so it never has to.
   if (counts(pending_)) pending_.reset();
+  // A captured certificate of a withdrawn plan must not be accepted after its withdrawal, even if it arrives first now.
   if (message.cause != withdrawal_t::UNKNOWN_PLAN) {
     last_accepted_ = std::max(last_accepted_.value_or(message.plan_id), message.plan_id);
     last_expiry_ = std::max(last_expiry_, message.expires_utime);

@@ -73,6 +73,7 @@ Supervisor::Supervisor(SupervisorOptions options, Robot& robot)
       robot_(robot),
       guard_(options_.guard),
       reports_({options_.robot_state, options_.transition, options_.event}) {
+  // So that no call allocates for a state of the size that the task has.
   state_.reserve(kMostStates);
   state_error_.reserve(kMostStates);
   step_began_at_.reserve(kMostStates);
@@ -156,6 +157,7 @@ void Supervisor::OnWithdrawn(Bytes message, std::int64_t now_us) noexcept {
                   static_cast<double>(answer.sequence), answer.message);
     else
       ReportRefusal(now_us, answer.verdict);
+    // Not at the next boundary: until then another control of what was withdrawn might be applied.
     if (IsExecuting() && MustStop()) StopInEmergency(now_us);
   });
   SendReports(now_us);

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "forereach/numerics/size.h"
-
 namespace forereach {
 namespace {
 
@@ -100,6 +98,7 @@ std::vector<Contact> FindContacts(const BodyPlaces& places, std::span<const Obst
 
 std::vector<Contact> FindContacts(const Problem& problem, const BodyPlaces& places, std::span<const Obstacle> obstacles,
                                   const Sample& from, const Sample& to, const Between& between) {
+  // The motions at the bounds of what is declared, one for each choice of signs: the nearest of them counts.
   const Eigen::Index free_signs = problem.projection.rows() + (problem.body.heading >= 0 ? 1 : 0);
   Approaches nearest = Far(obstacles.size());
   for (unsigned signs = 0; signs < 1U << free_signs; ++signs)

@@ -46,6 +46,7 @@ void Disturbance::Add(std::span<double> next, std::span<const double> z) {
   std::vector<Interval> grown(next.size(), 0);
   if (growing_) growing_->Enclose(std::vector<Interval>(z.begin(), z.end()), grown);
   if (adversarial_ && --steps_left_ < 0) {
+    // A sign that is held pushes the robot off further than one drawn anew each step.
     steps_left_ = static_cast<int>(random_() % kLongestHold);
     for (double& sign : signs_) sign = random_() >> 63 == 0 ? 1 : -1;
   }
@@ -55,6 +56,7 @@ void Disturbance::Add(std::span<double> next, std::span<const double> z) {
       for (std::size_t k = 0; k < bounds.size(); ++k)
         bounds[k] = std::min(bounds[k], region.disturbance[static_cast<Eigen::Index>(k)]);
   for (std::size_t k = 0; k < next.size(); ++k) {
+    // Less than the bound by a unit in the last place, so that the rounded sum is within it, too.
     const double share = Share(k), unit = NextUp(std::abs(next[k])) - std::abs(next[k]);
     const double bound = AddDown(bounds[k], grown[k].lower);
     next[k] += share * std::max(0.0, SubDown(bound, unit));

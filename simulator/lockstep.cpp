@@ -5,8 +5,6 @@
 #include <iostream>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "bus/bus_options.h"
 #include "bus/process.h"
 #include "forereach/numerics/size.h"
@@ -30,10 +28,10 @@ void RequireStanding(const Config& config) {
   const std::vector<double>&start = config.robot.start, &half_width = config.planner.initial_half_width;
   for (const int k : HeldStates(config))
     if (!(std::abs(start[ToSize(k)]) <= half_width[ToSize(k)]))
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "{}: robot.start: {} is {}, and the simulated robot stands at its start: the states of robot.hold are zero "
           "there, up to planner.initial_half_width; begin with 0",
-          config.path, config.problem->model->state_names()[ToSize(k)], ToText(start[ToSize(k)])));
+          config.path, config.problem->model->state_names()[ToSize(k)], ToText(start[ToSize(k)]));
 }
 
 }  // namespace
@@ -64,6 +62,7 @@ void Lockstep::Run(Node* last) {
   Deliver();
   std::vector<Node*> nodes{&robot_, &planner_, &certifier_};
   if (last != nullptr) nodes.push_back(last);
+  // The robot ends the run by its own limit. This one is for a robot that does not.
   const auto end = now_us_ + static_cast<std::int64_t>((config_.robot.time_limit_s + 60) * 1e6);
   const auto is_done = [&] { return robot_.done() || (last != nullptr && last->done()); };
   while (!is_done() && now_us_ < end) {

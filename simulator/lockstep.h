@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <vector>
 
 #include "bus/node.h"
 #include "certifier/gate/obstacle_sender.h"

@@ -59,7 +59,7 @@ SampleRange ParseRange(const std::string& text) {
     return {text.substr(0, equals), ParseNumber(text.substr(equals + 1, colon - equals - 1)),
             ParseNumber(text.substr(colon + 1))};
   } catch (const std::logic_error&) {  // what stod throws
-    throw ConfigError("--range " + text + ": has to be NAME=LOWER:UPPER, as in v=7.25:15.75");
+    throw ConfigError("--range {}: has to be NAME=LOWER:UPPER, as in v=7.25:15.75", text);
   }
 }
 
@@ -73,7 +73,7 @@ void WriteTransitions(const std::string& config_path, const SampleOptions& optio
         MakeTransitions(*MakeTarget(config), *config.problem, options.seed, options.count, ranges, {}, &disturbance);
     SaveTransitions(options.output, *config.problem->model, made);
   } catch (const std::invalid_argument& error) {
-    throw ConfigError(config_path + ": " + error.what());
+    throw ConfigError("{}: {}", config_path, error.what());
   }
 }
 

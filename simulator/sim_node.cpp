@@ -8,7 +8,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "bus/bus_options.h"
@@ -39,7 +38,7 @@ std::vector<double> Joined(std::span<const double> x, std::span<const double> u)
 std::optional<Config> Load(const std::string& path, const BusOptions& in_force) try {
   Config config = LoadConfig(path);
   const std::string why = WhyKeyCannotChange(in_force, config.bus, Role::kRobot);
-  if (!why.empty()) throw ConfigError(path + ": " + why);
+  if (!why.empty()) throw ConfigError("{}: {}", path, why);
   return config;
 } catch (const std::exception& error) {
   logging::Error("not reloaded: {}", WhyFailed(error));
@@ -71,7 +70,7 @@ Config WithKeysOfRobot(Config config) {
 
 void RequireSize(const Config& config, const char* key, std::size_t size, std::int64_t expected) {
   if (static_cast<std::int64_t>(size) != expected)
-    throw ConfigError(fmt::format("{}: {}: {} entries, it has to have {}", config.path, key, size, expected));
+    throw ConfigError("{}: {}: {} entries, it has to have {}", config.path, key, size, expected);
 }
 
 }  // namespace
@@ -159,12 +158,14 @@ void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   MeasureState();
   heard_utime_ = utime;
   const std::vector<double> room = LimitRoom(control);
+  // First the step that ends: a contact or the goal is reported with the state that was checked.
   supervisor_.FinishStep(utime, now_us);
   ReportContacts(utime, moves);
   ReportLimits(utime, room);
   state_before_ = state_;
   ReportGoal(utime);
   const bool ends = goal_reached_ || static_cast<double>(utime - *start_utime_) >= config_.robot.time_limit_s * 1e6;
+  // It stays for some boundaries, so that others hear that it has finished.
   if (supervisor_.Boundary(utime, now_us, ends).empty() && ends && !is_stopping_) ++finished_boundaries_;
   late_before_us_ = late_us;
   LogProgress(utime);
@@ -188,6 +189,7 @@ void RobotSimNode::Hold() {
 void RobotSimNode::BrakeUntil(std::int64_t utime) {
   const std::vector<double> before = state_;
   const Box& inputs = config_.problem->domain.input;
+  // Zero is not an input of every robot.
   const Eigen::VectorXd idle = inputs.lower().cwiseMax(0).cwiseMin(inputs.upper());
   const std::span<const double> no_drive(idle.data(), ToSize(idle.size()));
   plant_(before, no_drive, state_, 0);
@@ -243,10 +245,10 @@ std::vector<Contact> RobotSimNode::Contacts(std::int64_t utime, bool moved) cons
 void RobotSimNode::ReportContacts(std::int64_t utime, bool moved) {
   for (const Contact& contact : Contacts(utime, moved)) {
     ++contacts_;
-    std::string text = "inside " + NameOf(obstacles_.all(), contact.obstacle);
+    std::string text = fmt::format("inside {}", NameOf(obstacles_.all(), contact.obstacle));
     if (config_.problem->body != Body())
       text = fmt::format("part {} meets {}", contact.part, NameOf(obstacles_.all(), contact.obstacle));
-    if (config_.problem->between) text += ", " + ToText(contact.at) + " of a step after the last sample";
+    if (config_.problem->between) text += fmt::format(", {} of a step after the last sample", ToText(contact.at));
     supervisor_.Report(utime, execution_event_t::CONTACT, contact.clearance, text);
   }
 }
@@ -269,9 +271,9 @@ void RobotSimNode::ReportLimits(std::int64_t utime, std::span<const double> room
     const std::string& name = limits_[i].name;
     if (std::isfinite(room[i]))
       supervisor_.Report(utime, execution_event_t::LIMIT_EXCEEDED, -room[i],
-                         name + " is " + ToText(-room[i]) + " beyond its bound");
+                         fmt::format("{} is {} beyond its bound", name, ToText(-room[i])));
     else
-      supervisor_.Report(utime, execution_event_t::LIMIT_EXCEEDED, 0, name + " has no finite value");
+      supervisor_.Report(utime, execution_event_t::LIMIT_EXCEEDED, 0, fmt::format("{} has no finite value", name));
   }
 }
 
@@ -281,7 +283,7 @@ void RobotSimNode::ReportGoal(std::int64_t utime) {
   goal_reached_ = true;
   supervisor_.Report(
       utime, execution_event_t::GOAL_REACHED, distance,
-      ToText(distance) + " m from the goal, it counts within " + ToText(config_.planner.goal_radius) + " m");
+      fmt::format("{} m from the goal, it counts within {} m", ToText(distance), ToText(config_.planner.goal_radius)));
 }
 
 Eigen::VectorXd RobotSimNode::Position() const {

@@ -30,7 +30,6 @@ accepts plans that are certified under the new file (Guard::Expect); its state a
 #pragma once
 
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>

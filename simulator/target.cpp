@@ -38,6 +38,7 @@ class ModelTarget final : public Target {
     std::copy(u.begin(), u.end(), std::copy(x.begin(), x.end(), all.begin()));
     const auto z = std::span<const double>(all).first(x.size() + u.size());
     std::array<long double, kMaxStates> nominal{}, residual{};
+    // Rounded once, at the end: what is added by rounding must stay far below a declared noise_bound.
     model_->EvaluateWide(z, std::span(nominal).first(next.size()));
     if (residual_) residual_->Evaluate(z, std::span(residual).first(next.size()));
     for (std::size_t k = 0; k < next.size(); ++k) next[k] = static_cast<double>(nominal[k] + residual[k]);
@@ -64,7 +65,7 @@ class ModelTarget final : public Target {
 TextFunction FunctionOf(const ParametricResidual& residual, const NominalModel& model) {
   if (residual.names.states != model.state_names() || residual.names.inputs != model.input_names() ||
       residual.values.size() != residual.names.states.size())
-    throw std::invalid_argument("for other states or inputs than those of " + model.name());
+    throw std::invalid_argument(fmt::format("for other states or inputs than those of {}", model.name()));
   return {residual.names, residual.values};
 }
 
@@ -79,12 +80,13 @@ std::vector<Interval> SampleBounds(const Problem& problem, const std::vector<Sam
   std::vector<Interval> bounds = problem.domain.Ranges();
   for (const SampleRange& range : ranges) {
     const auto name = std::find(names.begin(), names.end(), range.name);
-    if (name == names.end()) throw std::invalid_argument("range: the model has no coordinate " + range.name);
+    if (name == names.end())
+      throw std::invalid_argument(fmt::format("range: the model has no coordinate {}", range.name));
     Interval& bound = bounds[ToSize(name - names.begin())];
     if (!(bound.lower <= range.lower && range.lower <= range.upper && range.upper <= bound.upper))
-      throw std::invalid_argument("range: " + range.name + " in [" + ToText(range.lower) + ", " + ToText(range.upper) +
-                                  "] is empty or not inside the domain's [" + ToText(bound.lower) + ", " +
-                                  ToText(bound.upper) + "]");
+      throw std::invalid_argument(fmt::format("range: {} in [{}, {}] is empty or not inside the domain's [{}, {}]",
+                                              range.name, ToText(range.lower), ToText(range.upper), ToText(bound.lower),
+                                              ToText(bound.upper)));
     bound = {range.lower, range.upper};
   }
   return bounds;
@@ -106,7 +108,7 @@ std::unique_ptr<Target> MakeTarget(const Config& config) {
   try {
     if (config.robot_residual) residual = FunctionOf(*config.robot_residual, *config.problem->model);
   } catch (const std::invalid_argument& error) {
-    throw ConfigError(config.path + ": robot.residual: " + config.robot_residual->name + ": " + error.what());
+    throw ConfigError("{}: robot.residual: {}: {}", config.path, config.robot_residual->name, error.what());
   }
   return std::make_unique<ModelTarget>(config.problem->model, config.problem->timing, std::move(residual),
                                        static_cast<std::uint64_t>(config.robot.disturbance_seed));

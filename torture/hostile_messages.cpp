@@ -141,6 +141,7 @@ certified_plan_t Sealed(certified_plan_t certified) {
   return certified;
 }
 
+// The worst that a forged certificate could be: newer than all, soon to start, and with slices that hold every state.
 certified_plan_t Widened(certified_plan_t certified, std::int64_t now_us) {
   certified.utime = now_us;
   certified.plan.plan_id += std::int64_t{1} << 32;

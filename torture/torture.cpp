@@ -58,7 +58,7 @@ class Torturer final {
     report_.gate_heard = status_.has_value();
     report_.robot_heard = state_.has_value();
     if (!status_ && !state_)
-      throw ConfigError(config_.bus.url + ": neither a gate's heartbeat nor a robot's state is heard");
+      throw ConfigError("{}: neither a gate's heartbeat nor a robot's state is heard", config_.bus.url);
     std::tie(report_.honest, report_.honest_is_judged) = AskHonestly();
     is_recording_ = false;  // what is heard from now on may be its own
     const auto part = [&](const auto& attack) {
@@ -94,7 +94,7 @@ class Torturer final {
     const auto asked = asked_.find(GetDigest(decision->plan_digest));
     if (asked == asked_.end()) return;
     ++(is_judged ? asked->second.judged : asked->second.refused);
-    asked->second.text = std::string(OutcomeName(decision->outcome)) + ", " + std::string(CauseName(decision->cause));
+    asked->second.text = fmt::format("{}, {}", OutcomeName(decision->outcome), CauseName(decision->cause));
   }
 
   // What a guard does only if it believes a message of this program.
@@ -132,6 +132,7 @@ class Torturer final {
     candidate_plan_t candidate{};
     candidate.utime = WallClockUs();
     candidate.sequence = sequence_++;
+    // Above those of an earlier run, which the gate may remember.
     candidate.plan_id = last_plan_id_ = std::max(last_plan_id_ + 1, candidate.utime);
     SetText(candidate.source, kSource);
     candidate.step_us = Microseconds(config_.robot.step_period_ms);
@@ -194,12 +195,12 @@ class Torturer final {
       row.refused += asked.refused;
       if (asked.judged <= asked.may_be_judged) continue;
       row.through += asked.judged - asked.may_be_judged;
-      row.remark = "judged: " + asked.text;
+      row.remark = fmt::format("judged: {}", asked.text);
     }
   }
 
   void SendFlawed(const CandidateFlaw& flaw) {
-    Begin(std::string("to the gate: ") + flaw.name);
+    Begin(fmt::format("to the gate: {}", flaw.name));
     const std::size_t count = flaw.make(Honest(), WallClockUs()).size();
     for (std::size_t i = 0; i < count; ++i) {
       const RawMessage message = flaw.make(Honest(), WallClockUs())[i];  // each with a plan_id of its own
@@ -241,6 +242,7 @@ class Torturer final {
     TortureRow& row = Begin("to the gate: a flood of candidates");
     for (int i = 0; i < options_.flood; ++i) {
       Send(config_.bus.candidate, Encode(Honest()));
+      // Its own queue must not overflow with the answers.
       if (i % 16 == 0) bus_->Dispatch(0);
     }
     if (!report_.gate_heard || HearsHeartbeat()) return;
@@ -270,7 +272,7 @@ class Torturer final {
   }
 
   void SendFlawed(const CertificateFlaw& flaw) {
-    TortureRow& row = Begin(std::string("to the guard: a certificate ") + flaw.name);
+    TortureRow& row = Begin(fmt::format("to the guard: a certificate {}", flaw.name));
     for (int i = 0; i < 3; ++i) {
       const certified_plan_t certified = flaw.make(Forged(), WallClockUs());
       forged_plans_.insert(certified.plan.plan_id);
@@ -284,7 +286,7 @@ class Torturer final {
     Listen(kAnswersWithinS);
     row.refused += std::exchange(refused_by_guard_, 0);
     row.through += std::ssize(obeyed_);
-    if (!obeyed_.empty()) row.remark = "obeyed: " + obeyed_.front();
+    if (!obeyed_.empty()) row.remark = fmt::format("obeyed: {}", obeyed_.front());
     obeyed_.clear();
   }
 
@@ -370,7 +372,7 @@ void RequireLoopback(const BusOptions& bus, const std::string& beyond_loopback) 
   const bool stays = !bus.url.starts_with("udpm://") || ParseMulticastUrl(bus.url).ttl == 0;
   if (stays || beyond_loopback == bus.bus_name()) return;
   throw ConfigError(
-      bus.url + ": leaves this machine (ttl is not 0). To torture other machines on purpose, add --beyond-loopback " +
+      "{}: leaves this machine (ttl is not 0). To torture other machines on purpose, add --beyond-loopback {}", bus.url,
       bus.bus_name());
 }
 

@@ -28,6 +28,7 @@ double LeastDistanceOfMiddle(const Abstained& abstained, const Tube& tube, const
     return places.At({middle.data(), ToSize(middle.size())});
   };
   double least = kInfinity;
+  // Between two samples the body is somewhere in the hull of both, less what the path may bend.
   const int length = problem.between ? 1 : 0, end = tube.length() - length;
   for (int t = first_step; t <= end; ++t) {
     const std::vector<BodyPart> from = at(t), to = at(t + length);
@@ -70,6 +71,7 @@ std::vector<advice_change_t> ChangesForLimits(const Abstained& abstained, const 
     const Limit& limit = limits.limits()[ToSize(i)];
     const double below = limit.at_least - reach->lower, above = reach->upper - limit.at_most;
     const double beyond = std::max(below, above);
+    // Not a sum that overflowed, nor a limit that holds.
     if (!(beyond > 0) || !std::isfinite(beyond)) continue;
     const int step = i == abstained.verdict.coordinate ? abstained.verdict.step : -1;
     changes.push_back(Change(advice_change_t::LIMIT, step, i, beyond));

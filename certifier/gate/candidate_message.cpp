@@ -67,6 +67,7 @@ std::int64_t StartOf(Bytes candidate) {
   };
   if (!is(EncodedSize<candidate_plan_t>(), candidate_plan_t::getHash()) &&
       !is(EncodedSize<candidate_batch_t>(), candidate_batch_t::getHash()))
+    // What is no candidate waits for its refusal, and is never due.
     return INT64_MAX;
   return FromBigEndian<std::int64_t>(candidate.subspan(kStartsAt));
 }

@@ -16,6 +16,8 @@ void Charge::Hear(const Identity& other, State its_state) {
   const bool is_earlier = other.IsEarlierThan(self_), decides = its_state == State::kInCharge,
              will_decide = its_state == State::kListening && is_earlier;
   const bool gives_way_at_once = self_.is_shadow && !other.is_shadow;
+  // Of two in charge the later one alone gives way, else nobody would be left. One that is not in charge yet waits for
+  // any that decides, and for an earlier one that is about to.
   const bool goes_before =
       state_ != State::kInCharge || gives_way_at_once ? decides || will_decide : decides && is_earlier;
   if (!goes_before) return;

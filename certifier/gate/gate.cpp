@@ -63,6 +63,7 @@ void Gate::Inherit(const Gate& before) {
   decisions_ = before.decisions_;
   certificates_ = before.certificates_;
   counts_ = before.counts_;
+  // What the old gate had learned is not in this one's observations, which are those of the file.
   counts_.learned = 0;
 }
 
@@ -94,7 +95,7 @@ GateAnswer Gate::Answer(Bytes message, const TimeSource& clock, std::optional<Re
       return answer;
     }
   } catch (const std::exception& error) {
-    from_outside = Rejection{decision_t::CAUSE_INTERNAL_ERROR, "internal error: " + WhyFailed(error)};
+    from_outside = Rejection{decision_t::CAUSE_INTERNAL_ERROR, fmt::format("internal error: {}", WhyFailed(error))};
   }
   return AnswerOne(message, now_us, clock, std::move(from_outside));
 }
@@ -118,6 +119,7 @@ Gate::Choice Gate::Choose(const candidate_batch_t& batch, std::int64_t now_us, c
   const auto decisions = CertifyAll(certifier_, plans, std::span(&initial_set, 1), obstacles_.indexed(),
                                     {.until_certified = true,
                                      .clock = clock,
+                                     // The other half is for the decision on the one that is chosen.
                                      .deadline = now_us + Microseconds(options_.decision_budget_ms) / 2,
                                      .tubes = std::span(&tube_, 1)});
   const auto certified = std::ranges::find(decisions, Outcome::kCertified, &Decision::outcome) - decisions.begin();
@@ -171,7 +173,7 @@ GateAnswer Gate::AnswerOne(Bytes bytes, std::int64_t now_us, const TimeSource& c
   } catch (const std::exception& error) {
     decision.outcome = decision_t::REJECTED;
     decision.cause = decision_t::CAUSE_INTERNAL_ERROR;
-    SetText(decision.message, "rejected: internal error: " + WhyFailed(error));
+    SetText(decision.message, fmt::format("rejected: internal error: {}", WhyFailed(error)));
     answer.certified.reset();
   }
   if (answer.certified) ++certificates_;
@@ -198,7 +200,7 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
   if (IsBatch(bytes)) {  // one that stands for candidates comes here by them
     candidate_batch_t batch;
     if (auto rejection = CheckBytes(bytes, batch)) return rejection;
-    return Rejection{decision_t::CAUSE_WRONG_DIMENSION, "batch: " + WhyNoBatch(batch)};
+    return Rejection{decision_t::CAUSE_WRONG_DIMENSION, fmt::format("batch: {}", WhyNoBatch(batch))};
   }
   if (auto rejection = CheckBytes(bytes, candidate)) return rejection;
   // Counted before it is judged: a gap is a loss also if what came is refused.
@@ -225,7 +227,7 @@ std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candid
   try {
     initial_set = InitialSetOf(candidate);
   } catch (const std::invalid_argument& error) {
-    return Rejection{decision_t::CAUSE_NON_FINITE, std::string("initial set: ") + error.what()};
+    return Rejection{decision_t::CAUSE_NON_FINITE, fmt::format("initial set: {}", error.what())};
   }
   return std::nullopt;
 }
@@ -243,12 +245,12 @@ std::optional<Gate::Rejection> Gate::CheckTimes(const candidate_plan_t& candidat
   switch (FreshnessOf(candidate.start_utime, now_us, 0, lifetime)) {
     case Freshness::kStale:
       return Rejection{decision_t::CAUSE_TOO_LATE,
-                       "its start was " + Milliseconds(now_us, candidate.start_utime) + " ago"};
+                       fmt::format("its start was {} ago", Milliseconds(now_us, candidate.start_utime))};
     // Its certificate would have expired before its start.
     case Freshness::kFuture:
-      return Rejection{decision_t::CAUSE_FUTURE, "starts in " + Milliseconds(candidate.start_utime, now_us) +
-                                                     ", a certificate lives " +
-                                                     ToText(options_.certificate_lifetime_ms) + " ms"};
+      return Rejection{decision_t::CAUSE_FUTURE, fmt::format("starts in {}, a certificate lives {} ms",
+                                                             Milliseconds(candidate.start_utime, now_us),
+                                                             ToText(options_.certificate_lifetime_ms))};
     case Freshness::kFresh: return std::nullopt;
   }
   return std::nullopt;
@@ -276,8 +278,9 @@ std::int64_t Gate::EarliestStart(std::int64_t now_us) const {
 std::optional<Gate::Rejection> Gate::CheckDeadline(const candidate_plan_t& candidate, std::int64_t now_us) const {
   if (candidate.start_utime >= EarliestStart(now_us)) return std::nullopt;
   return Rejection{decision_t::CAUSE_DEADLINE,
-                   "it starts in " + ToText(static_cast<double>(candidate.start_utime - now_us) / 1e3) +
-                       " ms, a decision may take " + ToText(options_.decision_budget_ms) + " ms",
+                   fmt::format("it starts in {} ms, a decision may take {} ms",
+                               ToText(static_cast<double>(candidate.start_utime - now_us) / 1e3),
+                               ToText(options_.decision_budget_ms)),
                    decision_t::ABSTAIN_DEADLINE};
 }
 
@@ -290,6 +293,7 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
   std::string how;
   if (pieces_ && verdict.outcome == Outcome::kSafety) {
     const std::int64_t deadline = decision.utime + Microseconds(options_.decision_budget_ms) / 2;
+    // A certificate that comes too late is dropped, so no piece is begun that may end after half of the budget.
     std::int64_t last = decision.utime, longest = 0;
     const auto goes_on = [&] {
       const std::int64_t now = clock();
@@ -319,7 +323,7 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
   if (!options_.shadow) return Attest(candidate, decision, answer.certified.emplace());
   decision.outcome = decision_t::REJECTED;
   decision.cause = decision_t::CAUSE_SHADOW;
-  SetText(decision.message, "rejected: shadow mode; else: " + sentence);
+  SetText(decision.message, fmt::format("rejected: shadow mode; else: {}", sentence));
 }
 
 Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& upheld, int first_step) noexcept {
@@ -424,8 +428,9 @@ void Gate::DropIfLate(GateAnswer& answer, std::int64_t now_us) const {
   answer.certified.reset();
   answer.decision.outcome = decision_t::ABSTAIN_DEADLINE;
   answer.decision.cause = decision_t::CAUSE_OVERRUN;
-  SetText(answer.decision.message, "abstained: the decision took " + ToText(static_cast<double>(taken) / 1e3) +
-                                       " ms, it may take " + ToText(options_.decision_budget_ms) + " ms");
+  SetText(answer.decision.message,
+          fmt::format("abstained: the decision took {} ms, it may take {} ms", ToText(static_cast<double>(taken) / 1e3),
+                      ToText(options_.decision_budget_ms)));
 }
 
 void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified) {
@@ -475,6 +480,7 @@ std::string Gate::Learn(Bytes bytes) {
   if (is_any && transition.longer > 0 && (learned == Learned::kNoNominalSlope || learned == Learned::kAmbiguousAngle))
     return {};
   if (learned != Learned::kAdded) return Explain(learned);
+  // A reader of the log learns the same messages in the same order, and finds the same digest.
   grounds_.observations = ChainedDigest(grounds_.observations, bytes);
   ++counts_.learned;
   return {};

@@ -62,16 +62,17 @@ class Track final {
   // @throws std::invalid_argument if the windows do not cover all times from the stamp of the message on.
   void RequireCover(std::int64_t stamp) const {
     if (const std::int64_t begin = pieces_.front()->from_utime; begin > stamp)
-      Refuse("begins at " + At(begin) + ", after the message of " + At(stamp));
+      Refuse(fmt::format("begins at {}, after the message of {}", At(begin), At(stamp)));
     std::int64_t covered = pieces_.front()->until_utime;
     for (const obstacle_t* piece : pieces_) {
       // Silence about a time must not mean that the obstacle is elsewhere (docs/decisions.md).
-      if (piece->from_utime > covered) Refuse("is nowhere between " + At(covered) + " and " + At(piece->from_utime));
+      if (piece->from_utime > covered)
+        Refuse(fmt::format("is nowhere between {} and {}", At(covered), At(piece->from_utime)));
       covered = std::max(covered, piece->until_utime);
       if (ends_ && piece->until_utime == end_ && piece->gone == 0)
-        Refuse("has two pieces that end at " + At(end_) + ", and only one of them is gone");
+        Refuse(fmt::format("has two pieces that end at {}, and only one of them is gone", At(end_)));
       if (piece->gone != 0 && piece->until_utime != end_)
-        Refuse("is gone at " + At(piece->until_utime) + " and goes on until " + At(end_));
+        Refuse(fmt::format("is gone at {} and goes on until {}", At(piece->until_utime), At(end_)));
     }
   }
 
@@ -249,7 +250,7 @@ Obstacle FromMessage(const obstacle_t& piece, std::int64_t stamp, const std::map
   const ObstacleMotion motion = MotionOf(piece, tracks.at(piece.track));
   const bool stands = motion.velocity.isZero(0) && motion.growth == 0 && motion.growth_rate == 0;
   const std::string why = stands ? "" : WhyNotFresh(piece.utime, stamp, kFarthestStampUs, kFarthestStampUs);
-  if (!why.empty()) throw std::invalid_argument(why + ", from its message");
+  if (!why.empty()) throw std::invalid_argument(fmt::format("{}, from its message", why));
   return motion == StandsSince(motion.stamp_us) ? shape : shape.Moving(motion);
 }
 
@@ -315,7 +316,7 @@ std::vector<Obstacle> FromMessage(std::span<const obstacle_t> pieces, std::int64
     if (piece.shape.kind == obstacle_shape_t::GRID) name = GetText(piece.name);
     if (!grids.is_open()) obstacles.push_back(OfDimension(dim, grids.TakeGrid().Named(name)));
   });
-  if (grids.is_open()) throw std::invalid_argument("the last obstacle: " + grids.WhyOpen());
+  if (grids.is_open()) throw std::invalid_argument(fmt::format("the last obstacle: {}", grids.WhyOpen()));
   return obstacles;
 }
 

@@ -78,6 +78,7 @@ std::size_t ObstacleSender::NextPart() {
   std::deque<std::size_t>& from = changed_.empty() ? again_ : changed_;
   const std::size_t part = from.front();
   from.pop_front();
+  // A part that has changed is sent twice, since one datagram may be lost.
   if (&from == &changed_) again_.push_back(part);
   return part;
 }
@@ -130,6 +131,7 @@ std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>
   std::vector<Obstacle> begun;
   GridRoom room;
   for (const Obstacle& obstacle : obstacles) {
+    // A map for which there is no room is sent as its rectangles.
     if (obstacle.grid() && room.Take(obstacle)) {
       begun.push_back(obstacle);
       continue;
@@ -159,6 +161,7 @@ std::vector<Obstacle> SeenBy(std::int64_t now_us, const std::vector<Obstacle>& o
 }
 
 void RequireSendable(const Config& config) try {
+  // What is sent changes at these times only, so a set that fits at each of them fits always.
   std::set<std::int64_t> changes{0};
   for (const Obstacle& obstacle : config.obstacles)
     if (obstacle.motion()) changes.insert(std::max<std::int64_t>(obstacle.motion()->from_us, 0));
@@ -169,7 +172,7 @@ void RequireSendable(const Config& config) try {
     static_cast<void>(FromMessage(pieces, time_us, static_cast<int>(config.problem->projection.rows()), seen));
   }
 } catch (const std::invalid_argument& error) {
-  throw ConfigError(config.path + ": task.obstacles: " + error.what());
+  throw ConfigError("{}: task.obstacles: {}", config.path, error.what());
 }
 
 }  // namespace forereach

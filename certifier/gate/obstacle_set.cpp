@@ -69,6 +69,7 @@ ObstacleSet::Known ObstacleSet::TakePart(const obstacles_t& message) {
   for (const auto& each : parts_)
     if (each) digests.push_back(each->digest);
   const Digest digest = SetDigestOf(digests);
+  // The sender's digest of the whole set: parts of two versions never make a set, whatever is lost between them.
   is_partial_ = digests.size() < parts_.size() || digest != GetDigest(message.set_digest);
   if (is_partial_) return Known::kPart;
   return std::exchange(complete_, digest) == digest ? Known::kSame : Known::kNew;

@@ -5,7 +5,6 @@ that the last message names. So a change costs the parts that changed, each mess
 two sets never pass for one: that would take a collision of BLAKE2b-256. */
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>

@@ -133,7 +133,7 @@ std::string ObstaclesInForce::Doubt(const std::string& why) {
 std::string ObstaclesInForce::WhyUnknown(std::int64_t now_us) const {
   if (options_.obstacles != ObstaclesSource::kBus) return {};
   if (std::string two = state_.sender.WhyTwo(now_us); !two.empty()) return two;
-  if (!state_.doubt.empty()) return "the last message was refused: " + state_.doubt;
+  if (!state_.doubt.empty()) return fmt::format("the last message was refused: {}", state_.doubt);
   const std::string partial = state_.set.WhyPartial();
   if (!state_.known_utime) return partial.empty() ? "none has been heard yet" : partial;
   if (state_.unconfirmed > 0)
@@ -141,15 +141,16 @@ std::string ObstaclesInForce::WhyUnknown(std::int64_t now_us) const {
                        state_.order.newest()->sequence);
   if (clocks_ && state_.arrival)
     if (const std::string why = WhyOff(*state_.arrival, *clocks_); !why.empty())
-      return "their sender's clock is " + why;
+      return fmt::format("their sender's clock is {}", why);
   switch (FreshnessAt(*state_.known_utime, now_us)) {
     case Freshness::kStale:
-      return (partial.empty() ? "the last message is " : partial + "; the last complete one is ") +
-             Milliseconds(now_us, *state_.known_utime) + " old, at most " + ToText(options_.obstacles_timeout_ms) +
-             " ms are allowed";
+      return fmt::format(
+          "{}{} old, at most {} ms are allowed",
+          partial.empty() ? "the last message is " : fmt::format("{}; the last complete one is ", partial),
+          Milliseconds(now_us, *state_.known_utime), ToText(options_.obstacles_timeout_ms));
     case Freshness::kFuture:
-      return "the last message is stamped " + Milliseconds(*state_.known_utime, now_us) +
-             " ahead: the clock was set back";
+      return fmt::format("the last message is stamped {} ahead: the clock was set back",
+                         Milliseconds(*state_.known_utime, now_us));
     case Freshness::kFresh: break;
   }
   return state_.sender.WhyNotAlone(now_us);

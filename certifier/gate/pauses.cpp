@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <fmt/core.h>
+
 #include "lcmtypes/freshness.h"
 
 namespace forereach {
@@ -24,8 +26,9 @@ std::int64_t Pauses::Since(std::int64_t since_us) const {
 
 std::string Pauses::Explain(std::int64_t since_us, std::int64_t most_us) const {
   const std::int64_t age = now_us_ - since_us, paused = Since(since_us);
+  // Only where the sender is not to blame: without the pauses it would have been heard in time.
   if (age <= most_us || age - paused > most_us) return {};
-  return ": this certifier itself did not run for " + Milliseconds(paused, 0);
+  return fmt::format(": this certifier itself did not run for {}", Milliseconds(paused, 0));
 }
 
 }  // namespace forereach

@@ -4,6 +4,8 @@
 #include <iterator>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "certifier/gate/stamp.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/limits.h"
@@ -51,8 +53,8 @@ withdrawal_t Judged(const Standing& standing, const Gate& gate) {
   message.obstacle = static_cast<std::int16_t>(verdict.obstacle);
   message.margin = verdict.margin;
   message.threshold = verdict.threshold;
-  SetText(message.message, "the first " + std::to_string(standing.steps) + " controls stand; now " +
-                               Explain(verdict, gate.certifier().problem(), gate.obstacles()));
+  SetText(message.message, fmt::format("the first {} controls stand; now {}", standing.steps,
+                                       Explain(verdict, gate.certifier().problem(), gate.obstacles())));
   return message;
 }
 
@@ -143,6 +145,7 @@ void PlanLedger::KeepSlices(Slices added) {
   std::deque<Slices>& slices = measured_.slices;
   const std::int64_t executing = measured_.last.plan_id, plan_id = added.certified->plan.plan_id;
   if (const auto known = FindSlices(plan_id); known != slices.end()) {
+    // A guard takes no second plan under the number that it executes.
     if (plan_id != executing) slices[ToSize(known - slices.begin())] = std::move(added);
     return;
   }
@@ -188,6 +191,7 @@ void PlanLedger::SeeStop(const execution_event_t& event, SenderId sender) {
   Place& last = measured_.last;
   const bool is_stop = event.kind == execution_event_t::ERROR_STOP || event.kind == execution_event_t::EMERGENCY_STOP ||
                        event.kind == execution_event_t::OFF_SCHEDULE || event.kind == execution_event_t::HALTED;
+  // It may have passed a boundary since its last state.
   const bool is_here = event.step == last.step || event.step == last.step + 1;
   if (is_stop && is_here && event.plan_id == last.plan_id && sender == last.sender) last.plan_id = -1;
 }
@@ -236,20 +240,20 @@ std::optional<PlanLedger::Stranger> PlanLedger::FindStranger(const robot_state_t
     why = "which was not certified, or should have ended";
   }
   return Stranger{state.executing_plan_id, state.executing_step,
-                  "the robot executes plan " + std::to_string(state.executing_plan_id) + ", " + why};
+                  fmt::format("the robot executes plan {}, {}", state.executing_plan_id, why)};
 }
 
 // Whether it began in time is decided once, by the first received state, because a clock may be set later.
 std::string PlanLedger::WhyNot(Record& record, const robot_state_t& state) const {
   if (state.executing_step < 0 || state.executing_step >= record.num_steps)
-    return "step " + std::to_string(state.executing_step) + " of " + std::to_string(record.num_steps);
+    return fmt::format("step {} of {}", state.executing_step, record.num_steps);
   if (record.began_in_time) return {};
   const std::int64_t latest = record.expires_utime + delay_us_;
   // Unsigned differences do not overflow, whatever the period that the planner has claimed.
   const auto driven = static_cast<std::uint64_t>(state.executing_step) * static_cast<std::uint64_t>(record.step_us);
   const auto began = static_cast<std::int64_t>(static_cast<std::uint64_t>(state.utime) - driven);
   if (began > latest)
-    return "which began " + Milliseconds(began, record.expires_utime) + " after its certificate had expired";
+    return fmt::format("which began {} after its certificate had expired", Milliseconds(began, record.expires_utime));
   record.began_in_time = true;
   return {};
 }
@@ -343,6 +347,7 @@ void PlanLedger::TakeAnswer(const execution_event_t& event) {
     // Plans of two sources may have one plan_id: each is answered for itself.
     const auto is_answered = [&](std::int64_t sequence) { return static_cast<double>(sequence) == event.value; };
     if (std::ranges::none_of(force.sent, is_answered)) continue;
+    // It has answered an earlier withdrawal, which left more of the plan.
     if (record.is_known && event.step > force.standing_steps) continue;
     force.withdrawal.reset();
     if (record.is_known) force.standing_steps = std::max<int>(event.step, 0);
@@ -361,6 +366,7 @@ void PlanLedger::SeeObstacles(const std::string& why_unknown, std::int64_t stead
 void PlanLedger::Judge(Gate& gate, std::int64_t now_us, bool is_contradicted) {
   const Grounds grounds = gate.grounds();
   const bool has_lost_obstacles = unknown_since_us_ && lost_us_ && unknown_us_ >= *lost_us_;
+  // What was learned is no premise: more observations take nothing back (docs/soundness.md, 3.13).
   const Premises premises{grounds.config, gate.transitions(), grounds.obstacles, is_contradicted, has_lost_obstacles};
   const bool have_changed = premises_ && premises_ != premises;
   premises_ = premises;
@@ -370,6 +376,7 @@ void PlanLedger::Judge(Gate& gate, std::int64_t now_us, bool is_contradicted) {
     if (!record.force) continue;
     record.force->is_changed |= have_changed;
     if (!record.force->is_changed) continue;
+    // A guard compares what an unknown plan is withdrawn under, the obstacles among it, so they have to be known.
     if (record.is_known || knows_obstacles || has_lost_obstacles)
       Judge(record, gate);
     else
@@ -382,10 +389,12 @@ void PlanLedger::Judge(Record& record, Gate& gate) {
   force.is_changed = false;
   if (record.is_known && force.is_withdrawn && force.standing_steps <= force.first_step) return;  // nothing is left
   if (premises_->has_lost_obstacles)
-    return Withdraw(record, gate.grounds(),
-                    Unjudged(withdrawal_t::OBSTACLES_LOST,
-                             "the obstacles have been unknown for " + Milliseconds(unknown_us_, 0) +
-                                 ", so nothing stands, and the stop is not certified: " + why_unknown_));
+    return Withdraw(
+        record, gate.grounds(),
+        Unjudged(
+            withdrawal_t::OBSTACLES_LOST,
+            fmt::format("the obstacles have been unknown for {}, so nothing stands, and the stop is not certified: {}",
+                        Milliseconds(unknown_us_, 0), why_unknown_)));
   if (!record.is_known)
     return Withdraw(
         record, GroundsForStranger(gate, premises_->is_falsified),
@@ -414,6 +423,7 @@ void PlanLedger::Withdraw(Record& record, const Grounds& grounds, const withdraw
   force.is_withdrawn = true;
   force.standing_steps = message.valid_steps;
   force.sent.clear();
+  // Due at once. Answers to what was sent before do not count.
   force.next_us = INT64_MIN;
   is_any_unanswered_ = true;
   ++withdrawals_;

@@ -321,6 +321,7 @@ class RepairSearch final {
       const Answer answer = Try(*pushed);
       if (answer == Answer::kCertified) return GoBack(draft, *pushed);
       if (answer != Answer::kRefused) return;
+      // Rest at the end has to be kept by every later push. What an obstacle or a limit lacks is found anew.
       if (verdict.cause != Cause::kNoStop) lacks.pop_back();
       draft = std::move(*pushed);
       verdict = verdict_;
@@ -374,11 +375,13 @@ class RepairSearch final {
       for (Eigen::Index j = 0; j < num_shapes; ++j) {
         if (!GoesOn()) return std::nullopt;
         const double middle = lower_[k] / 2 + upper_[k] / 2, own = progress.row(k).dot(shapes[ToSize(j)]);
+        // Away from the nearer bound: a push that is clipped would hide the slope.
         const double part = own <= middle * shapes[ToSize(j)].sum() ? kProbe : -kProbe;
         moved.row(k) += part * half_range_[k] * shapes[ToSize(j)];
         gradient.col(k * num_shapes + j) = (values(WithTail(moved, draft.way, 0)) - before) / part;
         moved.row(k) = progress.row(k);
       }
+    // A push that leaves no plan behind has no slope: it is not tried.
     gradient = gradient.unaryExpr([](double slope) { return std::isfinite(slope) ? slope : 0.0; });
     const Eigen::VectorXd change = LeastChange(gradient, missing, before, lacks);
     if (!change.allFinite() || change.isZero(0)) return std::nullopt;
@@ -518,6 +521,7 @@ std::optional<Repair> FindRepair(const Abstained& abstained, int progress_steps,
                                  const std::function<bool()>& goes_on) {
   if (abstained.verdict.outcome != Outcome::kDomain && abstained.verdict.outcome != Outcome::kSafety)
     return std::nullopt;
+  // Without safety coordinates there is no distance by which one plan is nearer than another.
   if (abstained.certifier.projection().dim() == 0) return std::nullopt;
   return RepairSearch(abstained, progress_steps, tails, tube, goes_on).Run();
 }

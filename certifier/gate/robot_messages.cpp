@@ -29,6 +29,7 @@ std::string FaultOf(const robot_state_t& state, int num_states) {
 
 bool TakeState(const robot_state_t& state, int num_states, std::int64_t now_us, const GateOptions& options,
                StreamOrder& states) {
+  // A state from the future would make all that follow look old.
   if (!FaultOf(state, num_states).empty() || CheckStamp(state.utime, now_us, options).freshness == Freshness::kFuture)
     return false;
   const StreamPosition position{state.sequence, state.utime};
@@ -77,7 +78,7 @@ ExecutedTransition FromMessage(const transition_t& message, const Problem& probl
   else
     transition.refusal =
         fmt::format("the step lasted {} us, further from model.dt, {} s, than {}", message.duration_us, ToText(dt),
-                    error > 0 ? "two errors of " + ToText(error) + " s"
+                    error > 0 ? fmt::format("two errors of {} s", ToText(error))
                               : "steps on time do; robot.step_error_ms and the model let no more count");
   return transition;
 }

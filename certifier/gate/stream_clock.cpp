@@ -2,6 +2,8 @@
 
 #include <cstdlib>
 
+#include <fmt/core.h>
+
 #include "certifier/gate/stamp.h"
 #include "forereach/numerics/text.h"
 #include "task/step_time.h"
@@ -10,11 +12,11 @@ namespace forereach {
 namespace {
 
 std::string Allowed(std::int64_t most_us) {
-  return ", at most " + ToText(static_cast<double>(most_us) / 1e3) + " ms are allowed";
+  return fmt::format(", at most {} ms are allowed", ToText(static_cast<double>(most_us) / 1e3));
 }
 
 std::string Lag(std::int64_t lag_us) {
-  return ToText(static_cast<double>(std::abs(lag_us)) / 1e3) + (lag_us < 0 ? " ms before" : " ms after");
+  return fmt::format("{} ms {}", ToText(static_cast<double>(std::abs(lag_us)) / 1e3), lag_us < 0 ? "before" : "after");
 }
 
 }  // namespace
@@ -30,11 +32,11 @@ std::string WhyOff(const Arrival& arrival, const ClockBounds& bounds) {
   const std::int64_t late = bounds.error_us + bounds.delay_us;
   switch (FreshnessOf(arrival.utime, arrival.at_us, late, bounds.error_us)) {
     case Freshness::kStale:
-      return "behind, or its messages are late: the last one arrived " + Milliseconds(arrival.at_us, arrival.utime) +
-             " after its stamp" + Allowed(late);
+      return fmt::format("behind, or its messages are late: the last one arrived {} after its stamp{}",
+                         Milliseconds(arrival.at_us, arrival.utime), Allowed(late));
     case Freshness::kFuture:
-      return "ahead: the last message arrived " + Milliseconds(arrival.utime, arrival.at_us) + " before its stamp" +
-             Allowed(bounds.error_us);
+      return fmt::format("ahead: the last message arrived {} before its stamp{}",
+                         Milliseconds(arrival.utime, arrival.at_us), Allowed(bounds.error_us));
     case Freshness::kFresh: break;
   }
   return {};
@@ -42,10 +44,12 @@ std::string WhyOff(const Arrival& arrival, const ClockBounds& bounds) {
 
 std::string WhyApart(const Arrival& robot, const Arrival& obstacles, const ClockBounds& bounds) {
   const std::int64_t of_robot = robot.at_us - robot.utime, of_obstacles = obstacles.at_us - obstacles.utime;
+  // Each arrives late by its clock and the network; a robot's stamp is also off by what a step may be.
   const std::int64_t most = bounds.error_us + bounds.delay_us + bounds.step_us;
   if (std::abs(of_robot - of_obstacles) <= most) return {};
-  return "the clocks of the robot and of the obstacles' sender are apart: their messages arrive " + Lag(of_robot) +
-         " and " + Lag(of_obstacles) + " their stamps" + Allowed(most);
+  return fmt::format(
+      "the clocks of the robot and of the obstacles' sender are apart: their messages arrive {} and {} their stamps{}",
+      Lag(of_robot), Lag(of_obstacles), Allowed(most));
 }
 
 }  // namespace forereach

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <functional>
 
+#include <fmt/core.h>
+
 #include "forereach/numerics/text.h"
 #include "task/step_time.h"
 
@@ -38,7 +40,7 @@ std::vector<UpheldDifference> FindDifferences(const Upheld& expected, const Uphe
   std::vector<UpheldDifference> differences;
   for (std::size_t k = 0; k < expected.state_error.size(); ++k)
     if (const double of_task = expected.state_error[k], of_plan = found.state_error[k]; of_task != of_plan)
-      differences.push_back({"state_error[" + std::to_string(k) + "]", ToText(of_task), ToText(of_plan)});
+      differences.push_back({fmt::format("state_error[{}]", k), ToText(of_task), ToText(of_plan)});
   if (expected.step_error_us != found.step_error_us)
     differences.push_back(
         {"step_error_us", std::to_string(expected.step_error_us), std::to_string(found.step_error_us)});

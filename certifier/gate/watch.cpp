@@ -4,7 +4,8 @@
 #include <cstdlib>
 #include <utility>
 
-#include "certifier/gate/stamp.h"
+#include <fmt/core.h>
+
 #include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "lcmtypes/names.h"
@@ -48,7 +49,7 @@ void Watch::SeeStamps(const std::optional<Arrival>& robot, const std::optional<A
   std::string why;
   if (const auto& bounds = options_.clocks; bounds && robot) {
     if (why = WhyOff(*robot, bounds->OfRobot()); !why.empty())
-      why = "the robot's clock is " + why;
+      why = fmt::format("the robot's clock is {}", why);
     else if (obstacles && WhyOff(*obstacles, *bounds).empty())
       why = WhyApart(*robot, *obstacles, *bounds);
   }
@@ -66,15 +67,17 @@ std::optional<Watch::Fault> Watch::Advance(std::int64_t now_us, std::int64_t ste
   offset_us_ = offset;
   Run(now_us, steady_us);
   std::optional<Fault> found;
+  // Before the robot's silence, which is measured by the clock that has jumped.
   if (std::abs(moved) > options_.max_clock_jump_us) {
     found = {fault_t::CLOCK_JUMP, now_us,
-             "the wall clock moved by " + Milliseconds(moved, 0) + ", at most " +
-                 Milliseconds(options_.max_clock_jump_us, 0) + " are allowed"};
+             fmt::format("the wall clock moved by {}, at most {} are allowed", Milliseconds(moved, 0),
+                         Milliseconds(options_.max_clock_jump_us, 0))};
   } else if (options_.needs_robot_state && robot_seen_us_ && now_us - *robot_seen_us_ > options_.robot_timeout_us) {
     found = {fault_t::ROBOT_STATE_LOST, now_us,
-             "the robot's state was last heard " + Milliseconds(now_us, *robot_seen_us_) + " ago, at most " +
-                 Milliseconds(options_.robot_timeout_us, 0) + " are allowed" +
-                 pauses_.Explain(*robot_seen_us_, options_.robot_timeout_us)};
+             fmt::format("the robot's state was last heard {} ago, at most {} are allowed{}",
+                         Milliseconds(now_us, *robot_seen_us_), Milliseconds(options_.robot_timeout_us, 0),
+                         pauses_.Explain(*robot_seen_us_, options_.robot_timeout_us))};
+    // States whose stamps are off are refused, so the robot only seems silent.
     if (!Lacks(Need::kClocks).empty()) found->why += "; " + Lacks(Need::kClocks);
   }
   return found && Latch(*found) ? found : std::nullopt;
@@ -101,7 +104,7 @@ Watch::State Watch::state() const {
 }
 
 std::optional<Watch::Refusal> Watch::WhyNot() const {
-  if (fault_) return Refusal{decision_t::CAUSE_FAULT, decision_t::REJECTED, "fault: " + fault_->why};
+  if (fault_) return Refusal{decision_t::CAUSE_FAULT, decision_t::REJECTED, fmt::format("fault: {}", fault_->why)};
   std::optional<Refusal> refusal;
   for (std::size_t need = 0; need < kNeeds; ++need) {
     if (lacking_[need].empty()) continue;

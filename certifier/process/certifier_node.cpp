@@ -20,6 +20,7 @@
 namespace forereach {
 namespace {
 
+// Every decision looks at each observation that is in no index yet.
 constexpr int kUnindexedAtMost = 128;
 constexpr std::int64_t kWarmUs = 1000;
 // An index of so many is built in about a millisecond; of more it is built in a thread of its own.
@@ -44,6 +45,7 @@ Config Checked(const Config& config) {
 
 std::int64_t RandomInstance() {
   std::random_device random;
+  // Not negative, and never 0, which in a heartbeat means none.
   const std::uint64_t bits = std::uint64_t{random()} << 32 | random();
   return static_cast<std::int64_t>(bits >> 1) | 1;
 }
@@ -179,7 +181,7 @@ void CertifierNode::TakeCharge() {
   plans_.TolerateIssuedUntil(clocks_.steady());
   if (fault_of_other_)
     Fail(PlainFault(fault_of_other_->cause,
-                    "latched by the certifier that was in charge before: " + fault_of_other_->why));
+                    fmt::format("latched by the certifier that was in charge before: {}", fault_of_other_->why)));
   else if (contradictions_.WasReported(config_))
     Fail(
         PlainFault(fault_t::DECLARATION_FALSIFIED, "the certifier that was in charge before has seen it contradicted"));
@@ -208,6 +210,7 @@ void CertifierNode::OnCandidate(const Received& received) {
     return;
   }
   queue_.Add(received.bytes);
+  // While it listens it may yet be in charge, so it holds a few and leaves the oldest to the other.
   if (is_in_charge() || queue_.size() <= kHeldAtMost) return;
   (void)queue_.TakeOldest();
   ++reporter_.counts.left_to_other;
@@ -237,7 +240,7 @@ void CertifierNode::LookForObstacles(std::int64_t now_us) {
   std::string why = gate_->WhyObstaclesUnknown(now_us);
   if (const auto& arrival = gate_->obstacles_arrival(); arrival && !why.empty())
     why += watch_.pauses().Explain(arrival->utime, Microseconds(gate_->options().obstacles_timeout_ms));
-  watch_.Set(Watch::Need::kObstacles, why.empty() ? "" : "waits for " + channels_.obstacles + ": " + why);
+  watch_.Set(Watch::Need::kObstacles, why.empty() ? "" : fmt::format("waits for {}: {}", channels_.obstacles, why));
   LookAtStamps();
 }
 
@@ -268,6 +271,7 @@ void CertifierNode::OnRobotState(const Received& received) {
   else if (is_one)
     ForgetRobot();
   LookAtRobot(received.utime);
+  // Such a state names no slice.
   if (state.mode == robot_state_t::FINISHED) return;
   if (!is_in_charge()) return;  // the robot may execute another's plans
   if (const auto departure = plans_.FindDeparture(state, received.sender)) Fail(SliceLeft(*departure));
@@ -286,7 +290,7 @@ void CertifierNode::SeeWhatRobotExecutes(const robot_state_t& state, bool is_one
 // What was seen of the robot counts if one sender sends it.
 void CertifierNode::LookAtRobot(std::int64_t now_us) {
   const std::string why = gate_->options().needs_robot_state ? robot_.WhyNotAlone(now_us) : robot_.WhyTwo(now_us);
-  if (!why.empty()) watch_.Set(Watch::Need::kRobotState, "waits for " + channels_.robot_state + ": " + why);
+  if (!why.empty()) watch_.Set(Watch::Need::kRobotState, fmt::format("waits for {}: {}", channels_.robot_state, why));
 }
 
 // Where no robot is needed, what was wrong with one that was heard does not count for longer than it is heard.
@@ -358,7 +362,8 @@ void CertifierNode::Obey(const command_t& command, std::int64_t now_us) {
       if (watch_.fault() && IsNotAfter(command.utime, watch_.fault()->utime, now_us, gate_->options()))
         return Refuse(channels_.command, "the reset was sent before the fault, so nobody has inspected the fault");
       if (!latch_.Forget())
-        return Refuse(channels_.command, "the fault stays, since the reset cannot be stored: " + latch_.why_not());
+        return Refuse(channels_.command,
+                      fmt::format("the fault stays, since the reset cannot be stored: {}", latch_.why_not()));
       if (watch_.Reset()) {
         ForgetRobot();
         logging::Warn("{} has cleared the fault", GetText(command.source));
@@ -383,6 +388,7 @@ void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
   fault.state = last_state_;
   fault.transition = last_transition_;
   SetText(fault.message, latched.why);
+  // In the kernel's hands before anything is sent: a process that is killed now still finds the fault when it starts.
   latch_.Put(fault);
   SendFault();
   latch_.Flush();  // the disk may take longer than a robot can wait
@@ -412,6 +418,7 @@ void CertifierNode::Tick(std::int64_t now_us) {
     Announce(PlainFault(fault->cause, fault->why).fault, *fault);
   }
   TakeReload();
+  // Before new certificates: what a robot may be driving is more urgent than what it may drive next.
   WithdrawPlans(now_us);
   AnswerWaiting();
   CompactIfDue();
@@ -476,10 +483,12 @@ GateAnswer CertifierNode::Decide(Bytes candidate) {
   LookForObstacles(now);
   if (const auto refusal = watch_.WhyNot())
     return gate_->Refuse(candidate, now, refusal->cause, refusal->why, refusal->outcome);
+  // The gate does not know what was seen before a restart or by another certifier.
   if (contradictions_.ContradictInForce() && !gate_->certifier().violation())
     return gate_->Refuse(candidate, now, decision_t::CAUSE_PAIRWISE,
                          "a transition that was seen before contradicts the declaration; another has to be declared",
                          decision_t::ABSTAIN_FALSIFIED);
+  // What could not be withdrawn is not certified.
   if (plans_.IsFull())
     return gate_->Refuse(candidate, now, decision_t::CAUSE_QUEUE_FULL,
                          "so many certified plans may be executed that another could not be withdrawn");
@@ -497,6 +506,7 @@ void CertifierNode::Answer(Bytes candidate, bool displaced) {
   const std::chrono::duration<double, std::micro> elapsed = std::chrono::steady_clock::now() - begin;
   answer.decision.elapsed_us = elapsed.count();
 
+  // First the plan, for which a robot may wait; the ledger's copy is made after it was sent.
   if (answer.certified) sender_.Send(channels_.certified, *answer.certified);
   sender_.Send(channels_.decision, answer.decision);
   if (answer.certified) {
@@ -536,6 +546,7 @@ void CertifierNode::TakeReload() {
   if (!loaded) return;
   reporter_.Hurry();
   if (!loaded->error.empty()) return;
+  // The old gate's counts, sources and obstacles stay; its observations do not.
   loaded->gate->Inherit(*gate_);
   gate_ = std::move(loaded->gate);
   config_ = std::move(loaded->config);

@@ -46,8 +46,6 @@ that the plan was handed to the bus before. */
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "bus/node.h"
 #include "certifier/gate/charge.h"

@@ -1,7 +1,6 @@
 #include "certifier/process/contradictions.h"
 
 #include <algorithm>
-#include <optional>
 #include <span>
 #include <stdexcept>
 
@@ -69,6 +68,7 @@ void Contradictions::Follow(const Config& config) {
   declaration_digest_ = config.grounds.declaration;
   problem_ = config.problem;
   is_any_ = !StepErrorUs(config.gate);
+  // Another declaration may allow what contradicted the one before, and other errors explain it.
   contradict_in_force_ = Contradict(config);
 }
 
@@ -81,6 +81,7 @@ void Contradictions::Add(Evidence one) {
 void Contradictions::AddReported(const Digest& model, const Digest& declaration) {
   const std::pair reported{model, declaration};
   if (std::ranges::find(reported_, reported) != reported_.end()) return;
+  // Anybody who may send heartbeats may report, so their number is bounded.
   if (reported_.size() >= kMostReported) reported_.erase(reported_.begin());
   reported_.push_back(reported);
   contradict_in_force_ = contradict_in_force_ || reported == std::pair(model_, declaration_digest_);

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "bus/log.h"
 #include "forereach/certifier_status_t.hpp"
 #include "lcmtypes/names.h"
@@ -42,7 +44,7 @@ void FaultLatch::Store() {
 void FaultLatch::TellWatch() {
   if (!file_) return;
   const bool could = watch_.Lacks(Watch::Need::kLatch).empty();
-  watch_.Set(Watch::Need::kLatch, file_->ready() ? "" : "no fault could be stored: " + file_->why_not());
+  watch_.Set(Watch::Need::kLatch, file_->ready() ? "" : fmt::format("no fault could be stored: {}", file_->why_not()));
   if (could && !file_->ready()) logging::Error("nothing is certified: no fault could be stored: {}", file_->why_not());
   if (!could && file_->ready()) logging::Info("{} can be written", file_->path());
 }
@@ -53,6 +55,7 @@ void FaultLatch::TakeOver(const LatchFile::Content& stored) {
     logging::Error("a transition from before this start contradicts the declaration: every candidate is F");
   if (!stored.fault || !watch_.Latch({stored.fault->cause, stored.fault->utime, stored.why})) return;
   fault_ = *stored.fault;
+  // Sent with the first heartbeat, for the robot that has heard nothing of it from this process.
   next_us_ = 0;
   logging::Error("fault {} from before this start: {}; nothing is certified. What to do: {}",
                  FaultName(stored.fault->cause), stored.why, FaultAdvice(stored.fault->cause));
@@ -68,6 +71,7 @@ void FaultLatch::Check() {
 bool FaultLatch::Forget() {
   if (!file_ || !watch_.fault()) return true;
   if (!file_->ready()) Open();
+  // On the disk before the watch forgets it: a fault that an operator has not cleared comes back after a restart.
   const bool is_forgotten =
       file_->ready() && file_->Put({std::nullopt, "", contradictions_.evidence()}) && file_->Flush();
   TellWatch();

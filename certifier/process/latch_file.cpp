@@ -125,7 +125,7 @@ bool LatchFile::Fail(const std::string& why) {
 }
 
 bool LatchFile::FailedTo(const std::string& what) {
-  return Fail(path() + ": cannot be " + what + ": " + std::generic_category().message(errno));
+  return Fail(fmt::format("{}: cannot be {}: {}", path(), what, std::generic_category().message(errno)));
 }
 
 bool LatchFile::OpenDirectory() {
@@ -134,23 +134,24 @@ bool LatchFile::OpenDirectory() {
   const int directory = ::open(directory_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (directory < 0) {
     if (error) errno = error.value();
-    return Fail(directory_ + ": cannot be made or opened: " + std::generic_category().message(errno));
+    return Fail(fmt::format("{}: cannot be made or opened: {}", directory_, std::generic_category().message(errno)));
   }
   if (::flock(directory, LOCK_EX | LOCK_NB) != 0) {
     const int cause = errno;
     ::close(directory);
     if (cause == EWOULDBLOCK)
-      throw BadInput("gate.state: " + directory_ +
-                     ": another certifier keeps its state there; each robot and each standby certifier needs its own "
-                     "directory (--state)");
-    return Fail(directory_ + ": cannot be locked: " + std::generic_category().message(cause));
+      throw BadInput(
+          fmt::format("gate.state: {}: another certifier keeps its state there; each robot and each standby certifier "
+                      "needs its own directory (--state)",
+                      directory_));
+    return Fail(fmt::format("{}: cannot be locked: {}", directory_, std::generic_category().message(cause)));
   }
   if (lock_ >= 0) ::close(lock_);
   lock_ = directory;
   struct stat its {};
   if (::fstat(lock_, &its) != 0) return FailedTo("looked at");
   if ((its.st_mode & S_IWOTH) != 0 && (its.st_mode & S_ISVTX) == 0)
-    return Fail(directory_ + ": anybody may write there: chmod o-w it");
+    return Fail(fmt::format("{}: anybody may write there: chmod o-w it", directory_));
   return true;
 }
 
@@ -159,6 +160,7 @@ std::optional<LatchFile::Content> LatchFile::Read() {
   may_write_ = ready_ = false;
   struct stat locked {
   }, named{};
+  // A lock on a directory that was moved away keeps nobody from the one in its place.
   const bool is_locked = lock_ >= 0 && ::fstat(lock_, &locked) == 0 && ::stat(directory_.c_str(), &named) == 0 &&
                          IsSameFile(locked, named);
   try {
@@ -185,7 +187,7 @@ std::optional<LatchFile::Content> LatchFile::Read() {
     FailedTo("written");
   } else if (::fstat(file_, &written) != 0 || !IsSameFile(read, written)) {
     CloseFile();
-    Fail(path() + ": was replaced while it was read");
+    Fail(fmt::format("{}: was replaced while it was read", path()));
   } else {
     may_write_ = true;
   }
@@ -196,14 +198,16 @@ std::optional<LatchFile::Content> LatchFile::ReadFrom(int file) {
   const std::string advice = "; it is unknown whether a fault was latched. Find the cause, then delete the file";
   struct stat its {};
   if (::fstat(file, &its) != 0) return FailedTo("looked at"), std::nullopt;
+  // This process itself has emptied it, and holds what it could not store.
   if (emptied_ && its.st_size == 0) return Content();
-  if (!S_ISREG(its.st_mode)) return Fail(path() + ": is no regular file" + advice), std::nullopt;
+  if (!S_ISREG(its.st_mode)) return Fail(fmt::format("{}: is no regular file{}", path(), advice)), std::nullopt;
+  // Whoever may write this file may clear a fault.
   if (its.st_uid != ::geteuid() && its.st_uid != 0)
     return Fail(fmt::format("{}: belongs to user {}, has to belong to user {} or 0{}", path(), its.st_uid, ::geteuid(),
                             advice)),
            std::nullopt;
   if ((its.st_mode & (S_IWGRP | S_IWOTH)) != 0)
-    return Fail(path() + ": others than its owner may write it" + advice), std::nullopt;
+    return Fail(fmt::format("{}: others than its owner may write it{}", path(), advice)), std::nullopt;
   if (its.st_size != static_cast<off_t>(kBytes))
     return Fail(fmt::format("{}: has {} bytes, has to have {}{}", path(), its.st_size, kBytes, advice)), std::nullopt;
   std::string text(kBytes, '\0');
@@ -219,12 +223,13 @@ std::optional<LatchFile::Content> LatchFile::ReadFrom(int file) {
   try {
     return ContentOf(text);
   } catch (const Json::exception& error) {
-    return Fail(path() + ": is damaged: it " + DescribeJsonError(error) + advice), std::nullopt;
+    return Fail(fmt::format("{}: is damaged: it {}{}", path(), DescribeJsonError(error), advice)), std::nullopt;
   }
 }
 
 bool LatchFile::Create(const std::string& text) {
   ::unlinkat(lock_, kNewName, 0);
+  // Under another name first, then renamed: a reader finds no file, or a whole one.
   const int made = ::openat(lock_, kNewName, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (made < 0) return FailedTo("made");
   file_ = made;
@@ -253,6 +258,7 @@ bool LatchFile::Put(const Content& content) {
   }
   if (file_ < 0) return false;
   FailedTo("written");
+  // What was written in part must not read as the content before it, which says that there is no fault.
   if (content.fault && !holds_fault_) emptied_ = ::ftruncate(file_, 0) == 0;
   return false;
 }
@@ -271,12 +277,13 @@ void LatchFile::Look() {
   ready_ = false;
   if (file_ < 0 || ::fstat(file_, &its) != 0 || ::fstat(lock_, &locked) != 0)
     return static_cast<void>(FailedTo("looked at"));
+  // Writes into a file that has no name any more succeed, and no restart reads them.
   if (::stat(directory_.c_str(), &named) != 0 || !IsSameFile(locked, named) ||
       ::fstatat(lock_, kName, &found, AT_SYMLINK_NOFOLLOW) != 0 || !IsSameFile(its, found))
-    return static_cast<void>(Fail(path() + ": was deleted or replaced"));
+    return static_cast<void>(Fail(fmt::format("{}: was deleted or replaced", path())));
   if (::fstatvfs(file_, &disk) != 0) return static_cast<void>(FailedTo("looked at"));
   if ((disk.f_flag & ST_RDONLY) != 0)
-    return static_cast<void>(Fail(path() + ": cannot be written: its disk is read-only"));
+    return static_cast<void>(Fail(fmt::format("{}: cannot be written: its disk is read-only", path())));
   ready_ = true;
   why_.clear();
 }

@@ -42,19 +42,19 @@ std::string StatusReporter::WhyNotOk(const Gate& gate) const {
   const Watch& watch = parts_.watch;
   if (!IsInCharge()) return watch.Lacks(Watch::Need::kCharge);
   if (watch.fault())
-    return std::string(FaultName(watch.fault()->cause)) + ": " +
-           (parts_.latch.ready() ? "" : "not stored, lost by a restart! ") + watch.fault()->why;
+    return fmt::format("{}: {}{}", FaultName(watch.fault()->cause),
+                       parts_.latch.ready() ? "" : "not stored, lost by a restart! ", watch.fault()->why);
   if (!parts_.latch.ready()) return watch.WhyNot()->why;
   if (IsContradicted(gate))
     return "the observations contradict the declaration: every candidate is F until a larger bound is reloaded; a "
            "reset does not help";
-  if (!parts_.reload.error().empty()) return "the last reload failed: " + parts_.reload.error();
+  if (!parts_.reload.error().empty()) return fmt::format("the last reload failed: {}", parts_.reload.error());
   if (const auto refusal = watch.WhyNot()) return refusal->why;
   if (const auto& other = parts_.charge.other())
     return fmt::format("another certifier, instance {:016x}, is on this bus and decides nothing", other->instance);
   if (gate.options().obstacles == ObstaclesSource::kBus) return "";
   return fmt::format("gate.obstacles is task: the {} of the task file are all there are{}", gate.obstacles().size(),
-                     counts.obstacles_refused ? "; " + parts_.channels.obstacles + " is refused" : "");
+                     counts.obstacles_refused ? fmt::format("; {} is refused", parts_.channels.obstacles) : "");
 }
 
 void StatusReporter::AddBusCounts(certifier_status_t& status) const {
@@ -102,6 +102,7 @@ certifier_status_t StatusReporter::Report(const Gate& gate, std::int64_t now_us,
   for (const std::string& clause : {clocks, why})
     if (!clause.empty()) message += (message.empty() ? "" : "; ") + clause;
   SetText(status.message, message);
+  // Said once: by the next report another message may have been taken.
   counts.obstacles_refused = false;
   return status;
 }

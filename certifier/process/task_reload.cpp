@@ -3,6 +3,8 @@
 #include <initializer_list>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "bus/bus_options.h"
 #include "bus/log.h"
 #include "lcmtypes/why_failed.h"
@@ -15,7 +17,7 @@ TaskReload::Loaded Load(const std::string& path, const BusOptions& in_force) try
   TaskReload::Loaded loaded{LoadConfig(path), nullptr, ""};
   RequireForCertifyingOnBus(loaded.config);
   loaded.error = WhyKeyCannotChange(in_force, loaded.config.bus, Role::kCertifier);
-  if (!loaded.error.empty()) loaded.error = path + ": " + loaded.error;
+  if (!loaded.error.empty()) loaded.error = fmt::format("{}: {}", path, loaded.error);
   loaded.gate = std::make_unique<Gate>(loaded.config);
   return loaded;
 } catch (const std::exception& error) {
@@ -51,6 +53,7 @@ std::string TaskReload::WhyNotTaken(const Config& config, const Config& in_force
   BusOptions bus = config.bus;
   bus.url = channels_.url;  // a command line may have given another
   bus.key = channels_.key, bus.keys = channels_.keys, bus.key_is_given = channels_.key_is_given;  // Load compares keys
+  // Sockets, threads, the latch and messages under way were made with these at the start.
   for (const auto& [changes, what] : std::initializer_list<std::pair<bool, const char*>>{
            {bus.name != channels_.name, "bus.name"},
            {bus.delay_ms != channels_.delay_ms, "bus.delay_ms"},
@@ -62,10 +65,11 @@ std::string TaskReload::WhyNotTaken(const Config& config, const Config& in_force
            {after.model->num_states() != before.model->num_states(), "the number of states"},
            {after.model->num_inputs() != before.model->num_inputs(), "the number of inputs"},
            {after.projection.rows() != before.projection.rows(), "the number of safety coordinates"}})
-    if (changes) return config.path + ": " + what + " cannot change while the certifier runs";
+    if (changes) return fmt::format("{}: {} cannot change while the certifier runs", config.path, what);
   // Reading a file does not undo what the robot has shown.
   if (contradictions.Contradict(config))
-    return config.path + ": a transition that was executed contradicts its declaration; another has to be declared";
+    return fmt::format("{}: a transition that was executed contradicts its declaration; another has to be declared",
+                       config.path);
   return "";
 }
 

@@ -1,7 +1,5 @@
 #include "certifier/gate/charge.h"
 
-#include <deque>
-
 #include "tests/test.h"
 
 namespace forereach::charge_test {

@@ -2,8 +2,6 @@
 of X_0 just may touch. */
 #pragma once
 
-#include <utility>
-
 #include "certifier/gate/candidate_message.h"
 #include "forereach/numerics/text.h"
 #include "task/config.h"

@@ -8,7 +8,6 @@ outside the input domain. */
 #include <cstdint>
 #include <memory>
 #include <string_view>
-#include <vector>
 
 #include "task/config.h"
 #include "tests/messages.h"

@@ -1,6 +1,5 @@
 #include "tests/faults/flood.h"
 
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <stdexcept>

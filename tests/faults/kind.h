@@ -4,11 +4,9 @@ table. Each family of kinds is a file with a class of its own, which knows nothi
 
 #include <cstdint>
 #include <functional>
-#include <iostream>
 #include <memory>
 #include <optional>
 #include <random>
-#include <set>
 #include <string>
 #include <vector>
 

@@ -6,7 +6,6 @@ by a thread of its own, so nothing that is done with the answers delays the next
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <string>
 #include <thread>
 #include <utility>
 #include <vector>

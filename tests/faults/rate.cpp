@@ -1,7 +1,6 @@
 // A thousand full-size candidates a second through the certifier's process on a real loopback bus: what is answered,
 // what the bus loses, how long an answer takes. Writes a table.
 #include <algorithm>
-#include <iostream>
 #include <optional>
 #include <sstream>
 

@@ -6,7 +6,6 @@
 #include <csignal>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string>
 #include <vector>

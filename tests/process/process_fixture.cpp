@@ -1,7 +1,6 @@
 #include "tests/process/process_fixture.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <fstream>
 #include <stdexcept>
 

@@ -1,5 +1,4 @@
 // `forereach tail` on a real bus.
-#include <csignal>
 
 #include "tests/test.h"
 
