@@ -4,6 +4,7 @@
 #include <iterator>
 #include <stdexcept>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "lcmtypes/names.h"
@@ -29,7 +30,7 @@ void Fill(const RecordedCase& recorded, RecordedAbstention& abstention) try {
     judged.controls.col(t) = Eigen::Map<const Eigen::VectorXd>(plan.input(t).data(), plan.num_inputs);
   judged.progress_steps = recorded.candidate->progress_steps;
 } catch (const std::invalid_argument& error) {
-  abstention.missing = std::string("its initial set: ") + error.what();
+  abstention.missing = fmt::format("its initial set: {}", error.what());
 }
 
 }  // namespace
@@ -69,7 +70,7 @@ void AbstentionReader::OnDecision(const RecordedDecision& recorded) {
   RecordedAbstention& abstention = all_.back();
   abstention.basis = recorded.basis;
   abstention.event = recorded.event;
-  abstention.name = recorded.event + ", plan " + std::to_string(decision.plan_id) + " of " + GetText(decision.source);
+  abstention.name = fmt::format("{}, plan {} of {}", recorded.event, decision.plan_id, GetText(decision.source));
   abstention.message = GetText(decision.message);
   abstention.outcome = decision.outcome;
   abstention.cause = decision.cause;
@@ -81,6 +82,7 @@ void AbstentionReader::OnDecision(const RecordedDecision& recorded) {
   if (!recorded.candidate) abstention.missing = judged.missing;
   if (!judged.candidate) return;
   abstention.candidate = *judged.candidate;
+  // None of these was judged by its numbers.
   if (decision.outcome == decision_t::REJECTED || decision.outcome == decision_t::ABSTAIN_DEADLINE ||
       decision.outcome == decision_t::ABSTAIN_OBSTACLES)
     return;
@@ -135,7 +137,7 @@ Abstentions AbstentionOf(const std::string& path, const std::string& config_path
   judged.obstacles = task.obstacles;
   return read;
 } catch (const nlohmann::json::exception& error) {
-  throw ConfigError(path + ": it " + DescribeJsonError(error));
+  throw ConfigError("{}: it {}", path, DescribeJsonError(error));
 }
 
 Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files, std::size_t most) {

@@ -22,6 +22,7 @@
 namespace forereach {
 namespace {
 
+// Of a search for the least change that turns a plan: to within a 256th of where it begins.
 constexpr int kHalvings = 8;
 
 struct Judgement {
@@ -99,12 +100,12 @@ class Widening {
       const auto [lower, upper] = domain_.Corners();
       switch (kind) {
         case DomainExit::Kind::kLower:
-          text += VariableName(model, index) + " from " + RoundedDown(lower[ToSize(index)]) +
-                  HowMuch(before_.Corners().first[ToSize(index)] - lower[ToSize(index)], index);
+          text += fmt::format("{} from {}{}", VariableName(model, index), RoundedDown(lower[ToSize(index)]),
+                              HowMuch(before_.Corners().first[ToSize(index)] - lower[ToSize(index)], index));
           break;
         case DomainExit::Kind::kUpper:
-          text += VariableName(model, index) + " to " + RoundedUp(upper[ToSize(index)]) +
-                  HowMuch(upper[ToSize(index)] - before_.Corners().second[ToSize(index)], index);
+          text += fmt::format("{} to {}{}", VariableName(model, index), RoundedUp(upper[ToSize(index)]),
+                              HowMuch(upper[ToSize(index)] - before_.Corners().second[ToSize(index)], index));
           break;
         case DomainExit::Kind::kInequality:
           text += fmt::format("inequality {} to {}", index, RoundedUp(domain_.inequalities[ToSize(index)].bound));
@@ -127,8 +128,8 @@ class Widening {
   [[nodiscard]] std::string HowMuch(double more, int index) const {
     const bool has_slopes =
         index < declaration_.lipschitz.cols() && (declaration_.lipschitz.col(index).array() != 0).any();
-    return " (by " + RoundedUp(more, 4) + (has_slopes ? ", with the slopes in it" : ", still without a slope in it") +
-           ")";
+    return fmt::format(" (by {}{})", RoundedUp(more, 4),
+                       has_slopes ? ", with the slopes in it" : ", still without a slope in it");
   }
 
   void SetRange(int index, bool is_lower, double value) {
@@ -160,6 +161,7 @@ struct Allowed {
 
   // The middle, then ends: all corners if few coordinates have two, otherwise the two outer ones.
   [[nodiscard]] std::vector<Eigen::VectorXd> Outcomes() const {
+    // A little inside: an end that rounding puts outside would contradict the declaration.
     const Eigen::VectorXd middle = (lower + upper) / 2, half = (upper - lower) / 2 * (1 - 1e-6);
     std::vector<Eigen::Index> wide;
     for (Eigen::Index k = 0; k < half.size(); ++k)
@@ -187,6 +189,7 @@ void AddObservation(Problem& problem, const Eigen::VectorXd& z, const Eigen::Vec
   all.x_next.conservativeResize(row + 1, Eigen::NoChange);
   all.z.row(row) = z.transpose();
   all.x_next.row(row) = (next + residual).transpose();
+  // As one that a robot has reported: the errors that are declared of these count.
   ++all.num_learned;
   if (all.longer.size() > 0) {
     all.longer.conservativeResize(row + 1);
@@ -276,7 +279,7 @@ class Adviser {
                           way.step);
     }
     Add({.change = Change::kObstacles,
-         .what = "if it passed farther away, or these stood farther away: " + what,
+         .what = fmt::format("if it passed farther away, or these stood farther away: {}", what),
          .amount = farthest,
          .after = {changed}});
   }
@@ -302,11 +305,11 @@ class Adviser {
     for (const int i : wider) {
       const Limit &before = case_.problem->limits[ToSize(i)], &now = changed.problem->limits[ToSize(i)];
       what += (what.empty() ? "" : ", ") + now.name;
-      if (now.at_least != before.at_least) what += " at least " + RoundedDown(now.at_least);
-      if (now.at_most != before.at_most) what += " at most " + RoundedUp(now.at_most);
+      if (now.at_least != before.at_least) what += fmt::format(" at least {}", RoundedDown(now.at_least));
+      if (now.at_most != before.at_most) what += fmt::format(" at most {}", RoundedUp(now.at_most));
     }
     Add({.change = Change::kLimits,
-         .what = "if its limits were wider: " + what,
+         .what = fmt::format("if its limits were wider: {}", what),
          .amount = static_cast<double>(wider.size()),
          .after = {changed}});
   }
@@ -329,7 +332,7 @@ class Adviser {
       if (!Turns(changed())) wider.Set(loose);
     }
     Add({.change = Change::kDomain,
-         .what = "if the domain, and with it the declaration, reached farther: " + wider.Describe(model_),
+         .what = fmt::format("if the domain, and with it the declaration, reached farther: {}", wider.Describe(model_)),
          .amount = static_cast<double>(wider.count()),
          .after = {changed()}});
   }
@@ -351,11 +354,12 @@ class Adviser {
     for (std::size_t i = 0; i < changed.problem->rest.size(); ++i) {
       const RestBound& bound = changed.problem->rest[i];
       if (bound.tolerance == case_.problem->rest[i].tolerance) continue;
-      what += (what.empty() ? "" : ", ") + StateName(model_, bound.coordinate) + " up to " + RoundedUp(bound.tolerance);
+      what += fmt::format("{}{} up to {}", what.empty() ? "" : ", ", StateName(model_, bound.coordinate),
+                          RoundedUp(bound.tolerance));
       ++count;
     }
     Add({.change = Change::kRest,
-         .what = "if standing allowed " + what + " at its end",
+         .what = fmt::format("if standing allowed {} at its end", what),
          .amount = static_cast<double>(count),
          .after = {changed}});
   }
@@ -372,7 +376,7 @@ class Adviser {
     const auto less = Least(1, kHalvings, [&](double amount) { return Turns(smaller(amount)); });
     const double factor = 1 - less.value_or(1);
     Add({.change = Change::kInitialSet,
-         .what = factor > 0 ? "from an initial set of " + RoundedDown(factor, 3) + " times its half-widths"
+         .what = factor > 0 ? fmt::format("from an initial set of {} times its half-widths", RoundedDown(factor, 3))
                             : "from the center of its initial set alone",
          .amount = factor,
          .after = {smaller(less.value_or(1))}});
@@ -380,6 +384,7 @@ class Adviser {
 
   void AdviseHorizon() {
     Case changed = case_;
+    // The longest first: what is certified of a plan need not be certified of its beginning, which may not end at rest.
     for (Eigen::Index steps = case_.controls.cols() - 1; steps > 0; --steps) {
       changed.controls = case_.controls.leftCols(steps);
       if (!Turns(changed)) continue;
@@ -441,9 +446,9 @@ class Adviser {
     for (int k = 0; k < lipschitz.rows(); ++k)
       for (int l = 0; l < lipschitz.cols(); ++l)
         if (lipschitz(k, l) > 0)
-          slopes.push_back({Change::kSlopes, "the slope of " + StateName(model_, k) + " in " + VariableName(model_, l),
-                            [k, l](Declaration& declaration, double factor) { declaration.lipschitz(k, l) *= factor; },
-                            k, l});
+          slopes.push_back(
+              {Change::kSlopes, fmt::format("the slope of {} in {}", StateName(model_, k), VariableName(model_, l)),
+               [k, l](Declaration& declaration, double factor) { declaration.lipschitz(k, l) *= factor; }, k, l});
     if (slopes.size() > kMostEntries) slopes.clear();
     if (slopes.size() != 1 && !lipschitz.isZero(0))
       slopes.push_back({Change::kSlopes, "all slopes",
@@ -473,8 +478,8 @@ class Adviser {
       const double less = Least(1 - most, 7, [&](double amount) { return Turns(smaller(amount)); }).value_or(1 - most);
       const std::string factor = RoundedDown(1 - less, 4);
       Add({.change = each.change,
-           .what = "if " + each.name + " were declared " + factor + " times as large",
-           .smaller = each.name + " " + factor,
+           .what = fmt::format("if {} were declared {} times as large", each.name, factor),
+           .smaller = fmt::format("{} {}", each.name, factor),
            .amount = 1 - less,
            .row = each.row,
            .column = each.column,
@@ -505,8 +510,8 @@ class Adviser {
       bool is_first = true;
       for (int k = 0; k < n; ++k) {
         if (!(allowed.upper[k] - allowed.lower[k] > 1e-12)) continue;
-        what += (is_first ? " " : ", ") + StateName(model_, k) + " +-" +
-                RoundedUp((allowed.upper[k] - allowed.lower[k]) / 2, 3);
+        what += fmt::format("{}{} +-{}", is_first ? " " : ", ", StateName(model_, k),
+                            RoundedUp((allowed.upper[k] - allowed.lower[k]) / 2, 3));
         is_first = false;
       }
       if (is_first) what += " nothing open";
@@ -571,7 +576,7 @@ class Adviser {
       static double unit(const Declaration&, int, const Violation&) { return 1; }
       static void apply(Declaration& declaration, int row, double more) { declaration.lipschitz.row(row) *= 1 + more; }
       static std::string describe(const std::string& state, double more) {
-        return "those of " + state + " times " + RoundedUp(1 + more, 4);
+        return fmt::format("those of {} times {}", state, RoundedUp(1 + more, 4));
       }
       static double amount(double more) { return 1 + more; }
     };
@@ -585,7 +590,7 @@ class Adviser {
       }
       static void apply(Declaration& declaration, int row, double more) { declaration.noise_bound[row] += more; }
       static std::string describe(const std::string& state, double more) {
-        return state + " " + RoundedUp(more, 4) + " more";
+        return fmt::format("{} {} more", state, RoundedUp(more, 4));
       }
       static double amount(double more) { return more; }
     };
@@ -671,8 +676,8 @@ std::string DescribePlace(const Problem& problem, const Eigen::VectorXd& z) {
   for (Eigen::Index l = 0; l < z.size(); ++l)
     if ((problem.declaration.lipschitz.col(l).array() != 0).any() ||
         std::ranges::count(problem.declaration.affine.columns, static_cast<int>(l)) > 0)
-      text +=
-          (text.empty() ? "" : ", ") + VariableName(*problem.model, static_cast<int>(l)) + " = " + RoundedDown(z[l], 4);
+      text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", VariableName(*problem.model, static_cast<int>(l)),
+                          RoundedDown(z[l], 4));
   return text.empty() ? "any place" : text;
 }
 

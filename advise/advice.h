@@ -5,8 +5,6 @@ declaration, an obstacle has to be elsewhere. */
 #pragma once
 
 #include <functional>
-#include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <fmt/core.h>
+
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "forereach/numerics/text.h"
@@ -94,20 +96,20 @@ class RemedySearch final {
   [[nodiscard]] std::optional<Remedy> Stale() const {
     const double age = Ms(candidate().utime, decision().utime);
     return Tried("gate.max_age_ms", &GateOptions::max_age_ms, age,
-                 "with gate.max_age_ms of at least " + RoundedUp(age));
+                 fmt::format("with gate.max_age_ms of at least {}", RoundedUp(age)));
   }
 
   [[nodiscard]] std::optional<Remedy> Ahead() const {
     const double ahead = Ms(decision().utime, candidate().utime);
-    return Tried(
-        "gate.max_ahead_ms", &GateOptions::max_ahead_ms, ahead,
-        "with gate.max_ahead_ms of at least " + RoundedUp(ahead) + ", if the sender's clock is right and not this one");
+    return Tried("gate.max_ahead_ms", &GateOptions::max_ahead_ms, ahead,
+                 fmt::format("with gate.max_ahead_ms of at least {}, if the sender's clock is right and not this one",
+                             RoundedUp(ahead)));
   }
 
   [[nodiscard]] std::optional<Remedy> StartsLate() const {
     const double until_start = Ms(decision().utime, candidate().start_utime);
     return Tried("gate.certificate_lifetime_ms", &GateOptions::certificate_lifetime_ms, until_start,
-                 "with gate.certificate_lifetime_ms of at least " + RoundedUp(until_start));
+                 fmt::format("with gate.certificate_lifetime_ms of at least {}", RoundedUp(until_start)));
   }
 
   // The gate has no say in this: the planner has to begin its plans later.
@@ -119,28 +121,29 @@ class RemedySearch final {
     candidate_plan_t later = candidate();
     later.start_utime += static_cast<std::int64_t>(std::ceil(steps * period * 1e3));
     return Remedy{
-        "with planner.lead_steps of at least " + RoundedUp(all) + ", or sent " + RoundedUp(needs) + " ms earlier",
+        fmt::format("with planner.lead_steps of at least {}, or sent {} ms earlier", RoundedUp(all), RoundedUp(needs)),
         IsJudgedBy(*abstention_.task, later), "planner.lead_steps", all};
   }
 
   [[nodiscard]] std::optional<Remedy> Deadline() const {
     const double until_start = Ms(decision().utime, candidate().start_utime);
     return Tried("gate.decision_budget_ms", &GateOptions::decision_budget_ms, until_start,
-                 "with gate.decision_budget_ms of at most " + RoundedDown(until_start) + ", or sent " +
-                     RoundedUp(gate().decision_budget_ms - until_start) + " ms earlier");
+                 fmt::format("with gate.decision_budget_ms of at most {}, or sent {} ms earlier",
+                             RoundedDown(until_start), RoundedUp(gate().decision_budget_ms - until_start)));
   }
 
   [[nodiscard]] std::optional<Remedy> Overrun() const {
     const double taken = decision().elapsed_us / 1e3;
     if (!(0 < taken && taken <= kHourMs)) return std::nullopt;
-    return Remedy{"with gate.decision_budget_ms of at least " + RoundedUp(taken) + ", if it takes no longer then",
-                  false, "gate.decision_budget_ms", taken};
+    return Remedy{
+        fmt::format("with gate.decision_budget_ms of at least {}, if it takes no longer then", RoundedUp(taken)), false,
+        "gate.decision_budget_ms", taken};
   }
 
   [[nodiscard]] std::optional<Remedy> QueueFull() const {
     const std::size_t waiting = abstention_.waiting;
     if (waiting <= static_cast<std::size_t>(gate().queue) || waiting > kLongestQueue) return std::nullopt;
-    return Remedy{"with gate.queue of at least " + std::to_string(waiting) + ", if the log has every candidate", false,
+    return Remedy{fmt::format("with gate.queue of at least {}, if the log has every candidate", waiting), false,
                   "gate.queue", static_cast<double>(waiting)};
   }
 
@@ -149,6 +152,7 @@ class RemedySearch final {
     if (!abstention_.last_obstacles) return std::nullopt;
     const auto& [bytes, arrived] = *abstention_.last_obstacles;
     Config changed = *abstention_.task;
+    // So long that only the message's own defects count, and not yet its age.
     changed.gate.obstacles_timeout_ms = kHourMs;
     ObstaclesInForce heard(changed);
     if (!heard.Update(bytes, arrived).empty()) return std::nullopt;
@@ -159,7 +163,7 @@ class RemedySearch final {
     const bool turns = gate.UpdateObstacles(bytes, arrived).empty() &&
                        gate.WhyObstaclesUnknown(decision().utime).empty() &&
                        IsJudged(gate.Decide(Encode(candidate()), decision().utime).decision);
-    return Remedy{"with gate.obstacles_timeout_ms of at least " + RoundedUp(silence), turns,
+    return Remedy{fmt::format("with gate.obstacles_timeout_ms of at least {}", RoundedUp(silence)), turns,
                   "gate.obstacles_timeout_ms", silence};
   }
 

@@ -19,7 +19,7 @@ std::string NamedBounds(const std::vector<std::string>& names, const Eigen::Vect
   std::string text;
   for (Eigen::Index k = 0; k < bounds.size(); ++k)
     if (bounds[k] != 0)
-      text += (text.empty() ? "" : ", ") + names[ToSize(static_cast<int>(k))] + " " + ToText(bounds[k]);
+      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", names[ToSize(static_cast<int>(k))], ToText(bounds[k]));
   return text;
 }
 
@@ -28,7 +28,7 @@ std::string Disturbances(const std::vector<std::string>& names, const Declaratio
   std::string text;
   for (Eigen::Index k = 0; k < std::ssize(names); ++k)
     if (const std::string bound = declaration.DisturbanceText(k); bound != "0")
-      text += (text.empty() ? "" : ", ") + names[ToSize(k)] + " " + bound;
+      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", names[ToSize(k)], bound);
   return text;
 }
 
@@ -54,14 +54,15 @@ void AddRatesAndTurns(const Config& config, std::vector<Hypothesis>& all) {
   std::string rates, angles;
   for (Eigen::Index k = 0; k < bound.size(); ++k)
     if (bound[k] < kInfinity)
-      rates += (rates.empty() ? "" : ", ") + model.state_names()[ToSize(static_cast<int>(k))] + " " + ToText(bound[k]);
+      rates += fmt::format("{}{} {}", rates.empty() ? "" : ", ", model.state_names()[ToSize(static_cast<int>(k))],
+                           ToText(bound[k]));
   if (!rates.empty())
-    all.push_back({"no state changes faster, a second, than " + rates,
+    all.push_back({fmt::format("no state changes faster, a second, than {}", rates),
                    "declared (model.rate_bound); `forereach declare --between --rates` proves it of the equations. "
                    "A transition that shows more falsifies it (F), a plan that needs more is not certified (D)"});
   for (const int k : model.angles()) angles += (angles.empty() ? "" : ", ") + model.state_names()[ToSize(k)];
   if (!angles.empty())
-    all.push_back({"no step turns " + angles + " by three quarters of a turn or more beyond the model",
+    all.push_back({fmt::format("no step turns {} by three quarters of a turn or more beyond the model", angles),
                    "declared (model.angles); a transition that seems off by more than a quarter of a turn is refused"});
 }
 
@@ -101,7 +102,7 @@ void AddTimes(const Config& config, std::vector<Hypothesis>& all) {
   for (const int k : timing.set_at_steps)
     set += (set.empty() ? "" : ", ") + config.problem->model->state_names()[ToSize(k)];
   if (!set.empty())
-    all.push_back({"software sets " + set + " at the steps' boundaries", "declared (model.set_at_steps)"});
+    all.push_back({fmt::format("software sets {} at the steps' boundaries", set), "declared (model.set_at_steps)"});
   if (const auto clocks = config.gate.max_clock_error_ms)
     all.push_back(
         {fmt::format("the clocks of the robot and of the obstacles' sender differ by at most {} ms", ToText(*clocks)),
@@ -130,14 +131,15 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
   const Declaration& declaration = problem.declaration;
   std::vector<Hypothesis> all{
       {declaration.state_error.isZero(0) ? "a measured state is the true one"
-                                         : "a measured state is off the true one by at most " +
-                                               NamedBounds(model.state_names(), declaration.state_error),
+                                         : fmt::format("a measured state is off the true one by at most {}",
+                                                       NamedBounds(model.state_names(), declaration.state_error)),
        WhoRefutesStateError(config)},
       {"the first state lies in X0",
        "the guard, which starts a plan only if all of the measured state +- its error does"},
-      {declaration.input_error.isZero(0) ? "the robot applies the plan's controls, one a step"
-                                         : "the robot applies the plan's controls, one a step, off by at most " +
-                                               NamedBounds(model.input_names(), declaration.input_error),
+      {declaration.input_error.isZero(0)
+           ? "the robot applies the plan's controls, one a step"
+           : fmt::format("the robot applies the plan's controls, one a step, off by at most {}",
+                         NamedBounds(model.input_names(), declaration.input_error)),
        declaration.input_error.isZero(0) ? "the guard, which hands out no others"
                                          : "the guard, which hands out no others, and declaration.input_error"}};
   AddTimes(config, all);
@@ -147,32 +149,32 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
   AddRatesAndTurns(config, all);
   if (const bool is_declared = !config.robot.emergency_stop.empty();
       is_declared || config.gate.obstacles == ObstaclesSource::kBus)
-    all.push_back({std::string("after a withdrawal, which no certificate covers, the robot stops ") +
-                       (is_declared ? "as robot.emergency_stop says" : "at once"),
+    all.push_back({fmt::format("after a withdrawal, which no certificate covers, the robot stops {}",
+                               is_declared ? "as robot.emergency_stop says" : "at once"),
                    "declared"});
-  const std::string falsify = std::string("declared; transitions of the file ") +
-                              (config.gate.learns ? "and of the bus " : "") + "that contradict it falsify it (F)";
+  const std::string falsify = fmt::format("declared; transitions of the file {}that contradict it falsify it (F)",
+                                          config.gate.learns ? "and of the bus " : "");
   const auto& [rows, columns] = declaration.affine;
   if (!rows.empty())
-    all.push_back({"the residual of " + NamesOf(model.state_names(), rows) + " is affine in " +
-                       NamesOf(model.variable_names(), columns) + ", on the whole domain",
+    all.push_back({fmt::format("the residual of {} is affine in {}, on the whole domain",
+                               NamesOf(model.state_names(), rows), NamesOf(model.variable_names(), columns)),
                    falsify});
   if (std::ssize(rows) < model.num_states())
     all.push_back({rows.empty() ? "the residual changes by no more than declaration.lipschitz, on the whole domain"
                                 : "that of the other states changes by no more than declaration.lipschitz, likewise",
                    falsify});
   if (!declaration.regions.empty())
-    all.push_back({"in " + std::to_string(declaration.regions.size()) +
-                       " boxes it changes by less, or less is uncertain, as declaration.regions says",
+    all.push_back({fmt::format("in {} boxes it changes by less, or less is uncertain, as declaration.regions says",
+                               declaration.regions.size()),
                    falsify});
   if (!declaration.noise_bound.isZero(0))
-    all.push_back(
-        {"recorded successors are off by at most " + NamedBounds(model.state_names(), declaration.noise_bound),
-         "declared; transitions refute it likewise"});
+    all.push_back({fmt::format("recorded successors are off by at most {}",
+                               NamedBounds(model.state_names(), declaration.noise_bound)),
+                   "declared; transitions refute it likewise"});
   if (declaration.given_are_exact)
     all.push_back({"the transitions of the file are exact", "declared (declaration.transitions_are)"});
   if (declaration.IsDisturbed())
-    all.push_back({"each step is disturbed by at most " + Disturbances(model.state_names(), declaration),
+    all.push_back({fmt::format("each step is disturbed by at most {}", Disturbances(model.state_names(), declaration)),
                    "declared; transitions refute it likewise"});
   if (problem.body != Body()) all.push_back({"the robot lies within the parts of task.body", "declared"});
   if (problem.between)

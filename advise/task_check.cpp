@@ -71,6 +71,7 @@ class Examination final {
     ExamineKeys();
     ReadTransitions();
     if (result_.transitions > 0) ExamineData();
+    // Emptied where a finding says that no observations can be made of them.
     if (problem_.transitions.size() > 0) ExamineTube();
     ExamineGoal();
     ExamineRobotStart();
@@ -94,7 +95,7 @@ class Examination final {
   }
   [[nodiscard]] std::string ObstacleText(std::size_t i) const {
     const std::string& name = config_.obstacles[i].name();
-    return ObstacleKey(i) + (name.empty() ? "" : " (" + name + ")");
+    return ObstacleKey(i) + (name.empty() ? "" : fmt::format(" ({})", name));
   }
 
   [[nodiscard]] const Box& BoxOf(std::size_t l) const {
@@ -151,9 +152,10 @@ class Examination final {
     result_.data = config_.transitions;
     std::error_code error;
     if (!std::filesystem::exists(result_.data, error)) {
-      Add("transitions", result_.data + " does not exist",
-          "record steps of the robot, or make some with the simulated one: forereach-robot-sim --config " +
-              options_.config + " --make-transitions " + result_.data + " --seed 1 --count 400");
+      Add("transitions", fmt::format("{} does not exist", result_.data),
+          fmt::format("record steps of the robot, or make some with the simulated one: forereach-robot-sim --config {} "
+                      "--make-transitions {} --seed 1 --count 400",
+                      options_.config, result_.data));
       return;
     }
     all_ = LoadTransitions(result_.data, model_);
@@ -162,7 +164,7 @@ class Examination final {
     try {
       ValidateDurations(problem_);
     } catch (const std::invalid_argument& refused) {
-      throw ConfigError(result_.data + ": dt_error: " + refused.what());
+      throw ConfigError("{}: dt_error: {}", result_.data, refused.what());
     }
   }
 
@@ -180,7 +182,7 @@ class Examination final {
     for (std::size_t l = 0; l < n; ++l) ExamineRange(l);
     if (rows_.empty()) return;
     if (const auto wrapped = FindWrappedAngle(model_, problem_.transitions)) {
-      Add("model", LineOf(rows_[ToSize(wrapped->row)]) + ": " + wrapped->what, wrapped->advice);
+      Add("model", fmt::format("{}: {}", LineOf(rows_[ToSize(wrapped->row)]), wrapped->what), wrapped->advice);
       problem_.transitions = {};
       return;
     }
@@ -190,11 +192,11 @@ class Examination final {
       ExamineRates();
       ExamineCurvature();
     } catch (const AmbiguousAngle& error) {
-      Add("transitions", LineOf(rows_[ToSize(error.row())]) + ": " + error.what(),
+      Add("transitions", fmt::format("{}: {}", LineOf(rows_[ToSize(error.row())]), error.what()),
           "the angle's unit has to be rad; a row of another unit, a lost step or a wrong model shows like this");
       problem_.transitions = {};
     } catch (const NoNominalValue& error) {
-      Add("transitions", LineOf(rows_[ToSize(error.row())]) + ": " + error.text(),
+      Add("transitions", fmt::format("{}: {}", LineOf(rows_[ToSize(error.row())]), error.text()),
           "take such states out of the domain and the data, or change the model's equations or parameters");
       problem_.transitions = {};
     }
@@ -212,6 +214,7 @@ class Examination final {
       if (exit.kind == DomainExit::Kind::kNone)
         (IsWithin(problem_, {z.data(), ToSize(z.size())}, false) ? rows_ : near_the_edge).push_back(i);
       const bool is_ball = exit.kind == DomainExit::Kind::kBall;
+      // Those beyond a range are ExamineRange's, with their values.
       if (!is_ball && exit.kind != DomainExit::Kind::kInequality) continue;
       const std::size_t which = ToSize(exit.index) + (is_ball ? problem_.domain.inequalities.size() : 0);
       if (outside[which]++ == 0) first[which] = i;
@@ -221,12 +224,14 @@ class Examination final {
       const std::size_t inequalities = problem_.domain.inequalities.size();
       const std::string key = which < inequalities ? fmt::format("domain.inequalities[{}]", which)
                                                    : fmt::format("domain.balls[{}]", which - inequalities);
-      Add(key, Count(outside[which], "transition") + " outside, the first in " + LineOf(first[which]), kWiden);
+      Add(key, fmt::format("{} outside, the first in {}", Count(outside[which], "transition"), LineOf(first[which])),
+          kWiden);
     }
     if (!near_the_edge.empty())
       Add("declaration",
-          Count(std::ssize(near_the_edge), "transition") + " left out, the first in " + LineOf(near_the_edge.front()) +
-              ": within state_error and input_error it may be outside the domain, where nothing is declared",
+          fmt::format("{} left out, the first in {}: within state_error and input_error it may be outside the domain, "
+                      "where nothing is declared",
+                      Count(std::ssize(near_the_edge), "transition"), LineOf(near_the_edge.front())),
           "widen the domain, if the declaration holds there", !rows_.empty());
     problem_.transitions = {all_.z(rows_, Eigen::all), all_.x_next(rows_, Eigen::all)};
     if (all_.longer.size() > 0) problem_.transitions.longer = all_.longer(rows_);
@@ -239,13 +244,13 @@ class Examination final {
     column.maxCoeff(&largest);
     if (const Eigen::Index below = (column.array() < Lower(l)).count(); below > 0)
       Add(DomainKey(l, "lower"),
-          names_[l] + ": " + Count(below, "transition") + " below " + ToText(Lower(l)) + ", the least is " +
-              ToText(column[least]) + " in " + LineOf(least),
+          fmt::format("{}: {} below {}, the least is {} in {}", names_[l], Count(below, "transition"), ToText(Lower(l)),
+                      ToText(column[least]), LineOf(least)),
           kWiden);
     if (const Eigen::Index above = (column.array() > Upper(l)).count(); above > 0)
       Add(DomainKey(l, "upper"),
-          names_[l] + ": " + Count(above, "transition") + " above " + ToText(Upper(l)) + ", the largest is " +
-              ToText(column[largest]) + " in " + LineOf(largest),
+          fmt::format("{}: {} above {}, the largest is {} in {}", names_[l], Count(above, "transition"),
+                      ToText(Upper(l)), ToText(column[largest]), LineOf(largest)),
           kWiden);
   }
 
@@ -332,13 +337,13 @@ class Examination final {
     for (std::size_t i = 0; i < std::min(exceeding.size(), kMostLines); ++i) {
       const auto& [value, line] = exceeding[i];
       lines += fmt::format("{}line {}: {}", i == 0 ? "" : ", ", line, Down(value)) +
-               (what.bound > 0 ? " (" + Down(DivDown(value, what.bound)) + " times)" : "");
+               (what.bound > 0 ? fmt::format(" ({} times)", Down(DivDown(value, what.bound))) : "");
     }
     if (exceeding.size() > kMostLines) lines += fmt::format(", and {} more", exceeding.size() - kMostLines);
     Add(what.key,
         fmt::format("{} in {} of {}{}: {}", what.begin, Count(std::ssize(exceeding), "transition"), result_.data,
                     what.is_remark ? "" : ", so nothing can be certified", lines),
-        what.advice + " " + Up(exceeding.front().first) + " at least", what.is_remark);
+        fmt::format("{} {} at least", what.advice, Up(exceeding.front().first)), what.is_remark);
   }
 
   // Rows in which a state changes faster than is declared.
@@ -357,8 +362,9 @@ class Examination final {
         if (shown[i][b] > bound.rate) exceeding.emplace_back(shown[i][b], FileLine(static_cast<Eigen::Index>(i)));
       const std::string& name = result_.states[ToSize(bound.state)];
       AddExceeding({bound.key, fmt::format("{} changes faster than {} a second", name, ToText(bound.rate)), bound.rate,
-                    "look at these lines and at the bound's unit, which is that of " + name +
-                        " per second. If the lines are right, declare",
+                    fmt::format("look at these lines and at the bound's unit, which is that of {} per second. If the "
+                                "lines are right, declare",
+                                name),
                     false},
                    std::move(exceeding));
     }
@@ -424,8 +430,9 @@ class Examination final {
     }
     if (most > 0)
       Remark("declaration.lipschitz",
-             loose + ": the data use at most " + Up(100 * most) +
-                 " % of what is declared: if that is all there is, the tubes are wider than they have to be",
+             fmt::format("{}: the data use at most {} % of what is declared: if that is all there is, the tubes are "
+                         "wider than they have to be",
+                         loose, Up(100 * most)),
              "declare less, if you have a reason beyond these data");
   }
 
@@ -453,7 +460,7 @@ class Examination final {
     }
     RemarkOnSlack();
     if (const std::string flat = certifier->Unexcited(); !flat.empty())
-      return Add("declaration.affine", flat + ", and nothing is certified without one",
+      return Add("declaration.affine", fmt::format("{}, and nothing is certified without one", flat),
                  "record steps that vary it, or leave a column out on which the residual does not depend");
     Tube tube;
     const Decision decision = certifier->Certify(plan, initial_set, {}, tube);
@@ -491,9 +498,9 @@ class Examination final {
                           ? ""
                           : fmt::format(", {} of them with line {}", *most, FileLine(most - found.of_each.begin())));
       for (const Violation& pair : found.worst)
-        what += (&pair == &worst ? "" : ", ") + lines(pair) +
-                (pair.bound > 0 ? fmt::format(" ({} times)", Down(DivDown(pair.difference, pair.bound)))
-                                : ": " + Down(pair.difference));
+        what += fmt::format("{}{}{}", &pair == &worst ? "" : ", ", lines(pair),
+                            pair.bound > 0 ? fmt::format(" ({} times)", Down(DivDown(pair.difference, pair.bound)))
+                                           : ": " + Down(pair.difference));
       if (found.count > std::ssize(found.worst))
         what += fmt::format(", and {} more", found.count - std::ssize(found.worst));
     }
@@ -509,8 +516,8 @@ class Examination final {
           "by so much, {}",
           name, Up(AddUp(declaration.DisturbanceBound(c), found.near / 2)), noise);
     } else {
-      advice += "declare more: " + noise + ", or this row larger" +
-                (found.factor < kInfinity ? " by a factor of " + Up(found.factor) : "");
+      advice += fmt::format("declare more: {}, or this row larger{}", noise,
+                            found.factor < kInfinity ? fmt::format(" by a factor of {}", Up(found.factor)) : "");
     }
     Add(RowKey(name), what, advice);
   }
@@ -579,7 +586,7 @@ class Examination final {
       if (decision.exit.kind == DomainExit::Kind::kLower || decision.exit.kind == DomainExit::Kind::kUpper)
         key =
             DomainKey(ToSize(decision.exit.index), decision.exit.kind == DomainExit::Kind::kLower ? "lower" : "upper");
-      advice += "widen the domain, if the declaration holds there" + NarrowerTube(tube);
+      advice += fmt::format("widen the domain, if the declaration holds there{}", NarrowerTube(tube));
     }
     Add(key,
         fmt::format("the tube of {}, without obstacles, ends at step {}: {}", PlanName(), tube.length(), result_.tube),
@@ -625,9 +632,10 @@ class Examination final {
         widest = k, share = of, half = width;
     }
     return share == 0 ? ""
-                      : "; or make the tube narrower: there the error of " + result_.states[widest] +
-                            " in one step is only known up to " + Up(half) +
-                            ", from a declaration that is too wide, or from data that are too far away";
+                      : fmt::format(
+                            "; or make the tube narrower: there the error of {} in one step is only known up to {}, "
+                            "from a declaration that is too wide, or from data that are too far away",
+                            result_.states[widest], Up(half));
   }
 
   // From task.initial_set, or the planner's X0 where that is wider.
@@ -650,10 +658,11 @@ class Examination final {
         const double half = tube.slice(t).HalfWidthUpper(bound.coordinate);
         if (half <= bound.tolerance) continue;
         Add("task.rest",
-            name + " is known only up to " + Up(half) + " after " + Count(t, "step") + from +
-                ", and standing is at most " + ToText(bound.tolerance) +
-                ": a plan of that length does not provably end at rest",
-            "raise the bound of " + name + ", if the robot's brakes take up what is left; or make the tube narrower",
+            fmt::format("{} is known only up to {} after {}{}, and standing is at most {}: a plan of that length does "
+                        "not provably end at rest",
+                        name, Up(half), Count(t, "step"), from, ToText(bound.tolerance)),
+            fmt::format("raise the bound of {}, if the robot's brakes take up what is left; or make the tube narrower",
+                        name),
             t > StepsThatCount());
         break;
       }
@@ -669,7 +678,7 @@ class Examination final {
     const Decision decision = certifier.Certify(plan, initial_set, {}, tube);
     if (decision.cause == Cause::kLimit)
       Add(fmt::format("task.limits[{}]", decision.coordinate),
-          "the tube of " + PlanName() + ": " + Explain(decision, *problem, {}, plan, tube),
+          fmt::format("the tube of {}: {}", PlanName(), Explain(decision, *problem, {}, plan, tube)),
           "change the start or the plan, raise the bound, or make the tube narrower",
           decision.step >= StepsThatCount());
   }
@@ -681,9 +690,9 @@ class Examination final {
       const Decision decision = certifier.Certify(PlanOf(1), initial_set, {&obstacle, 1}, tube);
       if (decision.outcome == Outcome::kSafety && decision.step == 0)
         Add(ObstacleKey(i),
-            "the robot " + (obstacle.name().empty() ? "may touch it" : MayTouch({&obstacle, 1}, 0)) +
-                " at the start: the proven distance is " + Down(decision.margin) + " m, and " + Up(decision.threshold) +
-                " m are needed",
+            fmt::format("the robot {} at the start: the proven distance is {} m, and {} m are needed",
+                        obstacle.name().empty() ? "may touch it" : MayTouch({&obstacle, 1}, 0), Down(decision.margin),
+                        Up(decision.threshold)),
             "move task.initial_set or the obstacle, or make them smaller");
     }
   }
@@ -714,8 +723,8 @@ class Examination final {
                     const char* advice) {
     if (!data.matters || !(Beyond(data, value) > kShareBeyond * (data.largest - data.least))) return;
     Remark(key,
-           data.name + ": " + what + " is " + Up(Beyond(data, value)) + " beyond the data, which lie in [" +
-               Down(data.least) + ", " + Up(data.largest) + "]: the further, the wider the tube",
+           fmt::format("{}: {} is {} beyond the data, which lie in [{}, {}]: the further, the wider the tube",
+                       data.name, what, Up(Beyond(data, value)), Down(data.least), Up(data.largest)),
            advice);
   }
 
@@ -727,16 +736,17 @@ class Examination final {
     for (std::size_t k = 0; k < start.size(); ++k)
       if (!model_.IsAngle(static_cast<int>(k)) && !(Lower(k) <= start[k] && start[k] <= Upper(k)))
         Add("robot.start",
-            result_.states[k] + " begins at " + ToText(start[k]) + ", and the domain is [" + ToText(Lower(k)) + ", " +
-                ToText(Upper(k)) + "]: no plan is found from there",
+            fmt::format("{} begins at {}, and the domain is [{}, {}]: no plan is found from there", result_.states[k],
+                        ToText(start[k]), ToText(Lower(k)), ToText(Upper(k))),
             "begin in the domain, or widen it, if the declaration holds there");
     const std::vector<double>& most = config_.planner.initial_half_width;
     const bool is_driven = !config_.planner.goal.empty() && (config_.robot.hold || model_.text() == nullptr);
     for (const int k : is_driven ? HeldStates(config_) : std::vector<int>())
       if (ToSize(k) < most.size() && !(std::abs(start[ToSize(k)]) <= most[ToSize(k)]))
         Remark("robot.start",
-               result_.states[ToSize(k)] + " begins at " + ToText(start[ToSize(k)]) +
-                   ", and robot.hold names it: the simulated robot stands at its start, so `forereach run` refuses it",
+               fmt::format("{} begins at {}, and robot.hold names it: the simulated robot stands at its start, so "
+                           "`forereach run` refuses it",
+                           result_.states[ToSize(k)], ToText(start[ToSize(k)])),
                "begin with 0");
     const BodyPlaces places(model_, problem_.projection, problem_.body);
     const std::vector<BodyPart> parts = places.At({start.data(), start.size()});
@@ -744,7 +754,7 @@ class Examination final {
       const Obstacle& obstacle = config_.obstacles[i];
       const auto touches = [&](const BodyPart& part) { return !(ApproximateDistance(obstacle, part) > 0); };
       if (!obstacle.motion() && std::ranges::any_of(parts, touches))
-        Add("robot.start", "the robot touches " + ObstacleText(i) + " there",
+        Add("robot.start", fmt::format("the robot touches {} there", ObstacleText(i)),
             "begin where the robot is clear, or move the obstacle");
     }
   }
@@ -758,11 +768,12 @@ class Examination final {
         ExamineStop(RobotMotion(config_, Braking::kHardest), "planner.emergency_stop", kMaxSteps,
                     ": no stop is found for a robot whose plan is withdrawn");
     } catch (const ConfigError& error) {
-      Remark("planner.stop", std::string("no planner starts with this task: ") + error.what(), "correct it");
+      Remark("planner.stop", fmt::format("no planner starts with this task: {}", error.what()), "correct it");
     }
   }
 
   // Whether the robot stops from some state at least in which it does not rest, near or far from task.initial_set.
+  // The seed is fixed, here and below, so that a task gets one answer.
   void ExamineStop(const RobotMotion& motion, const char* key, int most, const char* consequence) {
     std::mt19937_64 random(1);
     const Eigen::VectorXd center = (config_.initial_set.lower() + config_.initial_set.upper()) / 2;
@@ -822,8 +833,8 @@ class Examination final {
       const auto k = ToSize(state);
       if (!(goal[ToSize(r)] >= Lower(k) && goal[ToSize(r)] <= Upper(k)))
         Add("planner.goal",
-            names_[k] + ": " + ToText(goal[ToSize(r)]) + " is outside [" + ToText(Lower(k)) + ", " + ToText(Upper(k)) +
-                "] of the domain: no certified plan gets there",
+            fmt::format("{}: {} is outside [{}, {}] of the domain: no certified plan gets there", names_[k],
+                        ToText(goal[ToSize(r)]), ToText(Lower(k)), ToText(Upper(k))),
             "move the goal, or widen the domain, if the declaration holds there");
       if (k < result_.coordinates.size())  // none without data
         RemarkOnData(result_.coordinates[k], goal[ToSize(r)], "planner.goal", ToText(goal[ToSize(r)]),
@@ -832,7 +843,7 @@ class Examination final {
     for (std::size_t i = 0; HasFrame(problem_.body) && i < config_.obstacles.size(); ++i)
       if (!config_.obstacles[i].motion() &&
           -ApproximateDistance(config_.obstacles[i], place) >= config_.planner.goal_radius)
-        Add("planner.goal", ObstacleText(i) + " covers the goal", "move one of them");
+        Add("planner.goal", fmt::format("{} covers the goal", ObstacleText(i)), "move one of them");
   }
 
   // The longest way of a point of the body in one nominal step, of those tried; a lower bound.
@@ -842,6 +853,7 @@ class Examination final {
     const auto n = ToSize(model_.num_states()), all = ToSize(model_.num_variables());
     double longest = 0;
     for (int sample = 0; sample < kSamples; ++sample) {
+      // The longest steps are mostly in corners, and points at random are hardly ever near one.
       const std::array<double, kMaxVariables> z = StateAndInput(random, sample % 2 == 1);
       std::array<double, kMaxStates> next{};
       if (!problem_.domain.Contains({z.data(), all})) continue;
@@ -899,7 +911,8 @@ class Examination final {
       for (const Ring& hole : keep_in.area.holes) {
         const auto [left, right] = std::ranges::minmax(hole, {}, &PlanePoint::x);
         const auto [low, high] = std::ranges::minmax(hole, {}, &PlanePoint::y);
-        if (may_pass(LeastExtent({left.x, low.y, 0}, {right.x, high.y, 0}), "a hole of " + keep_in.name)) return;
+        if (may_pass(LeastExtent({left.x, low.y, 0}, {right.x, high.y, 0}), fmt::format("a hole of {}", keep_in.name)))
+          return;
       }
   }
 
@@ -916,7 +929,7 @@ class Examination final {
     if (problem_.projection.rows() != 2) return;
     result_.is_planar = true;
     Picture& picture = result_.picture;
-    picture.title = "forereach check: " + std::filesystem::path(options_.config).filename().string();
+    picture.title = fmt::format("forereach check: {}", std::filesystem::path(options_.config).filename().string());
     picture.obstacles = config_.obstacles;
     for (Eigen::Index i = 0; i < all_.z.rows(); i += 1 + all_.z.rows() / kMostCompared)
       picture.observations.emplace_back(problem_.projection * all_.z.row(i).head(model_.num_states()).transpose());

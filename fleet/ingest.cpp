@@ -32,7 +32,8 @@ void Count(const Rows& rows, Ingested& sum) {
 
 void RequireRobot(const std::string& robot, const std::string& log) {
   if (robot.empty())
-    throw StoreError(log + ": says not whose it is, since its logger had no keys: name the robot with --robot");
+    throw StoreError(
+        fmt::format("{}: says not whose it is, since its logger had no keys: name the robot with --robot", log));
 }
 
 }  // namespace
@@ -89,7 +90,7 @@ const std::string& DatabaseIngest::RobotOf(const std::string& log_file) {
   if (!runs_.contains(log_file)) LearnRuns();  // it began since
   const auto run = runs_.find(log_file);
   const std::string& robot = run == runs_.end() ? options_.robot : run->second.robot;
-  RequireRobot(robot, path_ + ": " + log_file);
+  RequireRobot(robot, fmt::format("{}: {}", path_, log_file));
   return robot;
 }
 

@@ -7,7 +7,6 @@ row that was sent twice is there once. Logs without a database give the rows tha
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 

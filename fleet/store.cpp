@@ -170,7 +170,7 @@ std::string WhyServerRefuses(const std::string& state) {
   if (of == "25") return "the server is read-only";
   const bool is_plain =
       state.size() == 5 && state.find_first_not_of("0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ") == std::string::npos;
-  return "the server refuses, with its error " + (is_plain ? state : std::string("of no number"));
+  return fmt::format("the server refuses, with its error {}", is_plain ? state : std::string("of no number"));
 }
 
 // A column's value as COPY takes it; several columns are a tuple.
@@ -381,7 +381,7 @@ bool Store::IsAddress(const std::string& database) {
 auto Store::With(const auto& work) {
   const auto lost = [this](const std::string& why) {
     connection_.reset();
-    return StoreAway("the store: " + why);
+    return StoreAway(fmt::format("the store: {}", why));
   };
   try {
     if (!connection_) connection_ = std::make_unique<Connection>(parameters_);
@@ -393,7 +393,7 @@ auto Store::With(const auto& work) {
   } catch (const pqxx::sql_error& error) {
     const std::string state = StateOf(error);
     if (connection_ ? !connection_->server.is_open() : state.empty()) throw lost("the server was lost");
-    if (!IsAway(state)) throw StoreError("the store: " + WhyServerRefuses(state));
+    if (!IsAway(state)) throw StoreError(fmt::format("the store: {}", WhyServerRefuses(state)));
     throw lost(WhyServerRefuses(state));
   } catch (const pqxx::failure&) {  // the commit was not confirmed, or the connection broke in another way
     throw lost("the server was lost");
@@ -520,6 +520,7 @@ std::vector<Store::OfRobot> Store::ReadTransitions(const WhichTransitions& which
   return With([&](Connection& connection) {
     pqxx::work work(connection.server);
     std::vector<OfRobot> found;
+    // From the last row's key on: however many rows lie before, the next ones cost the same.
     for (Values& values : ValuesOf(work.exec_params(
              "SELECT * FROM transitions WHERE ($1 = '' OR robot = $1) AND event_utime >= $2 AND event_utime < $3 AND "
              "(robot, log_file, event_number, event_utime) > ($4, $5, $6, $7) "

@@ -123,6 +123,7 @@ class Reading final {
     const Eigen::Index count = std::ssize(places_);
     const Eigen::Map<const RowMajor> z(z_.data(), count, d), next(next_.data(), count, n);
     Transitions some{z(kept_, Eigen::all), next(kept_, Eigen::all)};
+    // As what a robot has learned: the errors that are declared of these count.
     some.num_learned = some.size();
     some.longer = Eigen::Map<const Eigen::VectorXd>(longer_.data(), count)(kept_);
     return some;
@@ -160,6 +161,8 @@ class Reading final {
     std::set<const std::string*> named;
     std::map<std::string, const std::string*> robots;
     for (const Place& place : places_) robots.emplace(*place.robot, place.robot);
+    // Each robot by itself first. Only of those that agree with themselves it is asked whether they agree with each
+    // other.
     for (const auto& [name, robot] : robots)
       static_cast<void>(
           FindContradiction([of = robot](const Place& place) { return place.robot == of; }, named, table));

@@ -2,8 +2,6 @@
 between robots, and which of them contradict the task's declaration. */
 #pragma once
 
-#include <vector>
-
 #include "fleet/report.h"
 #include "fleet/store.h"
 #include "task/config.h"

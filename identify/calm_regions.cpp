@@ -18,6 +18,7 @@ constexpr int kMostCompared = 1000, kMostCut = 4000;  // observations that make 
 constexpr int kCuts = 15;                             // that are tried along each variable of a cell
 constexpr double kRoom = 0.05;                        // around the observations
 
+// Upwards, to what a person reads in a task file.
 double RoundedShort(double x) { return std::strtod(RoundedUp(x, 4).c_str(), nullptr); }
 
 struct Cell {
@@ -50,6 +51,7 @@ class CellSearch final {
     if (rows_.empty()) return;
     do Compare();
     while (std::ssize(cells_) < options_.most_cells && CutOnce());
+    // A sample says where to cut; a bound that holds has to hold for every observation.
     for (Cell& cell : cells_) cell.members.clear();
     for (int i = 0; i < seen_.size(); ++i)
       std::ranges::find_if(cells_, [&](const Cell& cell) {

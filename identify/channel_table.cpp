@@ -4,8 +4,6 @@
 #include <limits>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "command_line/nearest.h"
 #include "forereach/numerics/text.h"
 #include "task/config_error.h"
@@ -25,12 +23,13 @@ std::string ChannelOf(const std::vector<std::string>& wanted) {
       if (name == kRecorded) continue;
       const std::string own = name.substr(0, name.find('.'));
       if (own == name || own.empty())
-        throw ConfigError("'" + name +
-                          "' has to be CHANNEL.field, of a message in the log, as in --state x=ODOMETRY.x; if the "
-                          "log has no such channel, its channels are named");
+        throw ConfigError(
+            "'{}' has to be CHANNEL.field, of a message in the log, as in --state x=ODOMETRY.x; if the log "
+            "has no such channel, its channels are named",
+            name);
       if (!channel.empty() && own != channel)
-        throw ConfigError("columns of two channels, " + channel + " and " + own +
-                          ": one has the states, and one may have the inputs");
+        throw ConfigError("columns of two channels, {} and {}: one has the states, and one may have the inputs",
+                          channel, own);
       channel = own;
     }
   }
@@ -39,7 +38,7 @@ std::string ChannelOf(const std::vector<std::string>& wanted) {
 
 ChannelTable::ChannelTable(const std::string& path, const std::vector<std::string>& wanted)
     : path_(path), channel_(ChannelOf(wanted)) {
-  if (channel_.empty()) throw ConfigError(path + ": no column names a channel, as CHANNEL.field does");
+  if (channel_.empty()) throw ConfigError("{}: no column names a channel, as CHANNEL.field does", path);
   for (const std::string& text : wanted) {
     Source source{WantedColumn(text), {}};
     for (const std::string& name : source.column.names()) {
@@ -82,8 +81,8 @@ void ChannelTable::Lose(const std::string& why) {
 LogTable ChannelTable::Finish() {
   if (messages_ == 0) {
     const std::string channels = Joined(counts_, [](const auto& channel) { return channel.first; });
-    throw ConfigError(fmt::format("{}: has no message on {}; its channels are {}", path_, channel_,
-                                  channels.empty() ? "none" : channels));
+    throw ConfigError("{}: has no message on {}; its channels are {}", path_, channel_,
+                      channels.empty() ? "none" : channels);
   }
   using RowMajor = decltype(table_.values);
   table_.values = Eigen::Map<const RowMajor>(numbers_.data(), std::ssize(table_.lines), std::ssize(sources_));

@@ -39,6 +39,7 @@ int AddSpreads(const std::vector<std::map<int, Eigen::VectorXd>>& by_delay, std:
   int count = 0;
   for (const auto& entry : by_delay.back()) {
     const int line = entry.first;
+    // Each delay loses other lines, and only the same lines can be compared.
     if (!std::ranges::all_of(by_delay, [&](const auto& errors) { return errors.contains(line); })) continue;
     ++count;
     for (std::size_t d = 0; d < by_delay.size(); ++d) {
@@ -62,6 +63,7 @@ void Compare(CommandDelay& delay, const Eigen::VectorXd& size) {
       if (most[k] > 0) sum += 2 * std::log(std::max(error[k], kExact * size[k]));
   }
   delay.best = static_cast<int>(std::ranges::min_element(logs) - logs.begin());
+  // All delays that the log does not tell from the best.
   delay.least = delay.largest = delay.best;
   for (int d = 0; d < static_cast<int>(logs.size()); ++d)
     if (const double apart = logs[ToSize(d)] - logs[ToSize(delay.best)];

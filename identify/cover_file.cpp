@@ -26,13 +26,14 @@ Json TreeJson(const Cover& cover, int index, const std::vector<std::string>& nam
 
 int IndexOf(const std::vector<std::string>& names, const std::string& name) {
   const auto found = std::ranges::find(names, name);
-  if (found == names.end()) throw ConfigError("the task has no " + name);
+  if (found == names.end()) throw ConfigError("the task has no {}", name);
   return static_cast<int>(found - names.begin());
 }
 
 Cover CoverOf(const Json& tree, const std::vector<std::string>& names) {
   Cover cover;
   cover.nodes.resize(1);
+  // A stack of its own: a file may nest as deep as it likes.
   std::vector<std::pair<int, const Json*>> open{{0, &tree}};
   while (!open.empty()) {
     const auto [index, json] = open.back();
@@ -63,6 +64,7 @@ void Append(CanonicalBytes& bytes, const Cover& cover) {
     const int index = open.back();
     open.pop_back();
     if (index < 0) {
+      // A tree that lacks a part has another digest than any that does not.
       bytes.Text("missing");
       continue;
     }
@@ -148,7 +150,7 @@ void SaveCover(const std::string& path, const Config& config, const std::vector<
       {"entries", entries},
       {"digests", {{"residual", ToHex(ResidualDigest(config))}, {"cover", ToHex(CoverDigest(claims))}}}};
   std::ofstream file(path, std::ios::binary);
-  if (!(file << JsonText(document) << "\n") || !file.flush()) throw ConfigError(path + ": cannot be written");
+  if (!(file << JsonText(document) << "\n") || !file.flush()) throw ConfigError("{}: cannot be written", path);
 }
 
 CoverFile LoadCover(const std::string& path, const Config& config) {
@@ -156,6 +158,7 @@ CoverFile LoadCover(const std::string& path, const Config& config) {
   const std::vector<std::string> names = ArgumentNames(config);
   CoverFile file;
   try {
+    // A cover is a tree of cuts, which is deep where slopes are steep.
     const Json document = ParseJson(text, std::numeric_limits<int>::max());
     for (const Json& entry : document.at("entries"))
       file.claims.push_back({IndexOf(names, entry.at("row").get<std::string>()),
@@ -164,9 +167,9 @@ CoverFile LoadCover(const std::string& path, const Config& config) {
     file.residual_digest = document.at("digests").at("residual").get<std::string>();
     file.cover_digest = document.at("digests").at("cover").get<std::string>();
   } catch (const Json::exception& error) {
-    throw ConfigError(path + ": not a cover of `forereach declare --cover`: it " + DescribeJsonError(error));
+    throw ConfigError("{}: not a cover of `forereach declare --cover`: it {}", path, DescribeJsonError(error));
   } catch (const ConfigError& error) {
-    throw ConfigError(path + ": not a cover for this task: " + error.what());
+    throw ConfigError("{}: not a cover for this task: {}", path, error.what());
   }
   return file;
 }

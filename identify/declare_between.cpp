@@ -9,7 +9,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "command_line/progress.h"
@@ -67,7 +66,8 @@ std::vector<MotionRow> RowsOf(const Config& config, const std::vector<MotionBoun
     std::string name;
     for (std::size_t k = 0; k < states.size(); ++k) {
       const double weight = frame(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
-      if (weight != 0) name += (name.empty() ? "" : " + ") + (weight == 1 ? "" : ToText(weight) + " ") + states[k];
+      if (weight != 0)
+        name += fmt::format("{}{}{}", name.empty() ? "" : " + ", weight == 1 ? "" : ToText(weight) + " ", states[k]);
     }
     if (!name.empty()) name += "''";
     if (problem.body.HasPlaces()) name += fmt::format("{}places''[{}]", name.empty() ? "" : ", ", i);
@@ -123,14 +123,15 @@ void AddRates(const Config& config, std::span<const int> states, const MotionBou
   std::vector<verifier::RateClaim> claims;
   for (std::size_t i = 0; i < states.size(); ++i) {
     const std::string& name = model.state_names()[ToSize(states[i])];
+    // The verifier is asked about the number that is printed, since that is what a person copies.
     const std::string most = RoundedUp(bounds.rates[i].upper, kMotionDigits);
     proposal.rows.push_back({"rate_bound", name + "'", "unit/s", bounds.rates[i]});
-    proposal.rates += (proposal.rates.empty() ? "" : ", ") + name + ": " + most;
+    proposal.rates += fmt::format("{}{}: {}", proposal.rates.empty() ? "" : ", ", name, most);
     claims.push_back({states[i], ParseNumber(most).value});
   }
   const verifier::RateVerdict verdict =
       verifier::CheckRates(model, config.problem->domain, LongestStep(*config.problem), bounds.reachable, claims);
-  proposal.rates = "rate_bound: {" + proposal.rates + "}";
+  proposal.rates = fmt::format("rate_bound: {{{}}}", proposal.rates);
   if (verdict.answer != verifier::Answer::kYes) proposal.unconfirmed = model.state_names()[ToSize(verdict.state)];
 }
 
@@ -139,10 +140,11 @@ MotionProposal FromEquations(const Config& config, const BetweenCommand& command
   const std::vector<ExpressionText> places = problem.body.Coordinates();
   const auto flow = MakeFlow(*problem.model, places);
   if (!flow)
-    throw ConfigError(config.path + ": model: the equations of " + problem.model->name() +
-                      " in continuous time are not known" +
-                      (command.rates ? ", so none of its rates is proven: `rate` says them, `next` does not"
-                                     : "; use --from positions"));
+    throw ConfigError("{}: model: the equations of {} in continuous time are not known{}", config.path,
+                      problem.model->name(),
+                      command.rates ? ", so none of its rates is proven: `rate` says them, `next` does not"
+                                    : "; use --from positions");
+  // The last slice is not tested against the domain; where it has to be at rest, that bounds it instead.
   Eigen::VectorXd rest = Eigen::VectorXd::Constant(problem.model->num_states(), kInfinity);
   for (const RestBound& bound : problem.rest) rest[bound.coordinate] = bound.tolerance;
   const Eigen::MatrixXd frame = FrameOf(problem);
@@ -159,14 +161,15 @@ MotionProposal FromEquations(const Config& config, const BetweenCommand& command
   proposal.rows = RowsOf(config, bounds.acceleration, bounds.turn_rate, bounds.turn_acceleration);
   if (command.rates) AddRates(config, moving, bounds, proposal);
   proposal.source = "equations";
-  proposal.remark = "Proven for the equations of " + problem.model->name() +
-                    ", for each motion with constant controls between two\nsamples that are in the domain" +
-                    (problem.rest.empty() ? ", and for the last step of a plan, which may leave the domain.\n"
-                                          : ", and for the last step of a plan, which ends at rest.\n") +
-                    "The residual is not included: it is a difference at the samples, and bounds no curvature between "
-                    "them. Add what\n"
-                    "the true robot does beyond the equations" +
-                    (command.rates ? ", and to a rate what residual and disturbance add in a second." : ".");
+  proposal.remark = fmt::format(
+      "Proven for the equations of {}, for each motion with constant controls between two\n"
+      "samples that are in the domain{}The residual is not included: it is a difference at the samples, and bounds no "
+      "curvature between them. Add what\n"
+      "the true robot does beyond the equations{}",
+      problem.model->name(),
+      problem.rest.empty() ? ", and for the last step of a plan, which may leave the domain.\n"
+                           : ", and for the last step of a plan, which ends at rest.\n",
+      command.rates ? ", and to a rate what residual and disturbance add in a second." : ".");
   return proposal;
 }
 
@@ -175,9 +178,10 @@ MotionProposal FromPositions(const Config& config) {
   const MeasuredMotion measured =
       MeasureMotion(*problem.model, problem.transitions, FrameOf(problem), problem.body, config.period);
   if (measured.triples == 0)
-    throw ConfigError(config.path +
-                      ": transitions: none begins with the state in which the one before it ends, so there is no "
-                      "second difference; use transitions that were recorded one after another");
+    throw ConfigError(
+        "{}: transitions: none begins with the state in which the one before it ends, so there is no "
+        "second difference; use transitions that were recorded one after another",
+        config.path);
   const auto found = [](double value) { return MotionBound{value, value, 0, true}; };
   std::vector<MotionBound> acceleration;
   for (const double value : measured.acceleration) acceleration.push_back(found(value));
@@ -201,9 +205,9 @@ std::string Yaml(const std::vector<MotionRow>& rows) {
     if (row.key == "acceleration")
       acceleration += (acceleration.empty() ? "" : ", ") + value;
     else if (row.key != "rate_bound")
-      others += ", " + row.key + ": " + value;
+      others += fmt::format(", {}: {}", row.key, value);
   }
-  return "between: {acceleration: [" + acceleration + "]" + others + "}";
+  return fmt::format("between: {{acceleration: [{}]{}}}", acceleration, others);
 }
 
 bool AllReached(const std::vector<MotionRow>& rows) {
@@ -236,7 +240,7 @@ void PrintForPeople(const MotionProposal& proposal, const Config& config) {
   std::string text =
       fmt::format("declare: motion between two samples, at most {} s apart, from the {}{}\n",
                   longest == config.period ? ToText(longest) : RoundedUp(longest, kMotionDigits),
-                  proven ? "equations of " + config.problem->model->name() : "logged positions",
+                  proven ? fmt::format("equations of {}", config.problem->model->name()) : "logged positions",
                   AllReached(proposal.rows) ? "" : "; stopped before --gap, at --seconds, --max-boxes or Ctrl-C");
   for (const MotionRow& row : proposal.rows) {
     text += fmt::format(
@@ -252,7 +256,8 @@ void PrintForPeople(const MotionProposal& proposal, const Config& config) {
     std::cout << "\nmodel:\n  " << proposal.rates
               << (proposal.unconfirmed.empty()
                       ? "\nThe verifier confirms these rates, for steps of up to "
-                      : "\nThe verifier does not confirm that of " + proposal.unconfirmed + ", for steps of up to ")
+                      : fmt::format("\nThe verifier does not confirm that of {}, for steps of up to ",
+                                    proposal.unconfirmed))
               << RoundedUp(LongestStep(*config.problem), kMotionDigits) << " s.";
   std::cout << std::endl;
 }
@@ -272,7 +277,7 @@ int DeclareBetween(const BetweenCommand& command) try {
   return AllReached(proposal.rows) && proposal.unconfirmed.empty() ? 0 : 1;
 } catch (const std::runtime_error& error) {
   if (dynamic_cast<const BadInput*>(&error)) throw;
-  throw std::runtime_error(command.config + ": model: " + error.what());
+  throw std::runtime_error(fmt::format("{}: model: {}", command.config, error.what()));
 }
 
 }  // namespace forereach

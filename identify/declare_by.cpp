@@ -15,7 +15,7 @@ namespace {
 
 int IndexOf(const std::string& name, const std::vector<std::string>& names) {
   const auto at = std::ranges::find(names, name);
-  if (at == names.end()) throw ConfigError("--by: the model has no '" + name + "'; " + Suggestion(name, names));
+  if (at == names.end()) throw ConfigError("--by: the model has no '{}'; {}", name, Suggestion(name, names));
   return static_cast<int>(at - names.begin());
 }
 
@@ -40,7 +40,7 @@ std::vector<std::vector<int>> ColumnsBy(const std::vector<std::string>& by, cons
       chosen.push_back(IndexOf(name, variables));
     if (for_one) {
       const auto k = ToSize(IndexOf(text.substr(0, at), states));
-      if (said[k]) throw ConfigError("--by: " + states[k] + " is given twice");
+      if (said[k]) throw ConfigError("--by: {} is given twice", states[k]);
       said[k] = true;
       columns[k] = chosen;
     } else {
@@ -56,24 +56,25 @@ std::string Explain(const Unexplained& found, const Config& config, const Propos
   const std::vector<std::string> variables = model.variable_names();
   const std::string columns =
       Joined(options.columns[ToSize(found.coordinate)], [&](int l) { return variables[ToSize(l)]; });
-  return "no L is consistent: two transitions " +
-         (columns.empty() ? std::string("of a residual that may depend on nothing") : "agree in " + columns) +
-         ", and their residuals of " + model.state_names()[ToSize(found.coordinate)] + " differ by " +
-         RoundedDown(found.pair.difference, 4) +
-         " more than noise_bound and disturbance allow. If the robot does not always do the same there, that is a "
-         "disturbance (--disturbance estimated); if the residual depends on more, name it (--by); if the sensor errs "
-         "by half of that, raise noise_bound (--noise estimated)";
+  return fmt::format(
+      "no L is consistent: two transitions {}, and their residuals of {} differ by {} more than noise_bound and "
+      "disturbance allow. If the robot does not always do the same there, that is a disturbance (--disturbance "
+      "estimated); if the residual depends on more, name it (--by); if the sensor errs by half of that, raise "
+      "noise_bound (--noise estimated)",
+      columns.empty() ? std::string("of a residual that may depend on nothing") : fmt::format("agree in {}", columns),
+      model.state_names()[ToSize(found.coordinate)], RoundedDown(found.pair.difference, 4));
 }
 
 Config LoadForSlopes(const std::string& path) {
   Config config = LoadConfig(path);
   if (!config.problem->declaration.affine.rows.empty())
-    throw ConfigError(config.path +
-                      ": declaration.affine: slopes are proposed for all rows or for none. Take it out, and put it "
-                      "back in place of the proposed rows");
+    throw ConfigError(
+        "{}: declaration.affine: slopes are proposed for all rows or for none. Take it out, and put it "
+        "back in place of the proposed rows",
+        config.path);
   if (!config.problem->declaration.regions.empty())
-    throw ConfigError(config.path +
-                      ": declaration.regions: slopes are proposed for the whole domain. Take the regions out first");
+    throw ConfigError("{}: declaration.regions: slopes are proposed for the whole domain. Take the regions out first",
+                      config.path);
   RequireNoWrappedAngle(config.path, config.transitions, *config.problem->model, config.problem->transitions);
   return config;
 }
@@ -84,20 +85,20 @@ std::string DeclarationYaml(const Declaration& declaration, const NominalModel& 
   const std::string rows = Joined(states, [&](const std::string& state) {
     const std::string row = Joined(variables, [&](const std::string& variable) {
       const double slope = declaration.lipschitz(&state - states.data(), &variable - variables.data());
-      return slope > 0 ? variable + ": " + ToText(slope) : "";
+      return slope > 0 ? fmt::format("{}: {}", variable, ToText(slope)) : "";
     });
-    return row.empty() ? "" : state + ": {" + row + "}";
+    return row.empty() ? "" : fmt::format("{}: {{{}}}", state, row);
   });
-  std::string text = "  lipschitz: {" + rows + "}\n  noise_bound: " + List(declaration.noise_bound) + "\n";
+  std::string text = fmt::format("  lipschitz: {{{}}}\n  noise_bound: {}\n", rows, List(declaration.noise_bound));
   if (declaration.growing) {
     text += "  disturbance:\n";
     for (Eigen::Index k = 0; k < std::ssize(states); ++k)
       if (const std::string bound = declaration.DisturbanceText(k); declaration.Grows(k))
-        text += "    " + states[ToSize(k)] + ": \"" + bound + "\"\n";
+        text += fmt::format("    {}: \"{}\"\n", states[ToSize(k)], bound);
       else if (bound != "0")
-        text += "    " + states[ToSize(k)] + ": " + bound + "\n";
+        text += fmt::format("    {}: {}\n", states[ToSize(k)], bound);
   } else if (declaration.IsDisturbed()) {
-    text += "  disturbance: " + List(declaration.disturbance) + "\n";
+    text += fmt::format("  disturbance: {}\n", List(declaration.disturbance));
   }
   if (!declaration.regions.empty()) text += "  regions:\n";
   for (const Region& region : declaration.regions) {
@@ -108,11 +109,11 @@ std::string DeclarationYaml(const Declaration& declaration, const NominalModel& 
     std::string bounds;
     for (Eigen::Index k = 0; k < region.disturbance.size(); ++k)
       if (const double w = region.disturbance[k]; w < kInfinity)
-        bounds += (bounds.empty() ? "" : ", ") + states[ToSize(k)] + ": " + ToText(w);
-    text += "    - {in: {" + box + "}, disturbance: {" + bounds + "}}\n";
+        bounds += fmt::format("{}{}: {}", bounds.empty() ? "" : ", ", states[ToSize(k)], ToText(w));
+    text += fmt::format("    - {{in: {{{}}}, disturbance: {{{}}}}}\n", box, bounds);
   }
-  if (declaration.DeclaresStateError()) text += "  state_error: " + List(declaration.state_error) + "\n";
-  if (declaration.input_error.size() > 0) text += "  input_error: " + List(declaration.input_error) + "\n";
+  if (declaration.DeclaresStateError()) text += fmt::format("  state_error: {}\n", List(declaration.state_error));
+  if (declaration.input_error.size() > 0) text += fmt::format("  input_error: {}\n", List(declaration.input_error));
   return text;
 }
 

@@ -4,10 +4,8 @@
 #include <cmath>
 #include <iostream>
 #include <limits>
-#include <sstream>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "command_line/nearest.h"
@@ -129,7 +127,7 @@ void PrintTrades(const ProposedDeclaration& proposal, const NominalModel& model,
       if (i > 0 && trades[i - 1].error == error) continue;
       const std::string slopes = !trades[i].slopes ? "" : Joined(names, [&](const std::string& name) {
         const double slope = (*trades[i].slopes)[&name - names.data()];
-        return slope > 0 ? name + " " + RoundedUp(slope, kTableDigits) : "";
+        return slope > 0 ? fmt::format("{} {}", name, RoundedUp(slope, kTableDigits)) : "";
       });
       std::string notes;
       for (const auto& [noted, note] :
@@ -261,8 +259,8 @@ void PrintRegions(const std::vector<CalmRegion>& regions, const DataCommand& com
   if (command.regions <= 1) return;
   if (regions.empty()) out << "No region needs less disturbance than the whole domain.\n";
   for (std::size_t i = 0; i < regions.size(); ++i)
-    out << (i == 0 ? "Transitions in each region, whose disturbance is " + ToText(command.factor) +
-                         " times what they need there: "
+    out << (i == 0 ? fmt::format("Transitions in each region, whose disturbance is {} times what they need there: ",
+                                 ToText(command.factor))
                    : ", ")
         << regions[i].observations << (i + 1 == regions.size() ? ".\n" : "");
 }
@@ -361,18 +359,16 @@ int DeclareFromData(const DataCommand& command) {
       document["held_out"] = ToJson(held_out);
       std::cout << JsonText(document) << std::endl;
     } else {
-      std::ostringstream text;
-      text << "declare: from " << problem.transitions.size() << " transitions, an estimate and no proof\n";
-      PrintSlopes(proposal, config, text);
-      PrintLoneSlopes(lone_slopes, config, text);
-      PrintErrors(proposal, *problem.model, text);
-      PrintTrades(proposal, *problem.model, command.factor, text);
-      PrintMeaning(proposal, *problem.model, command, text);
-      PrintRegions(regions, command, text);
-      if (held_out.slices() > 0)
-        text << "With every other block of time as observations: " << TextOf(held_out) << ".\n";
-      std::cout << text.str() << "\ndeclaration:\n"
-                << DeclarationYaml(proposal.declaration, *problem.model) << std::flush;
+      std::ostream& out = std::cout;
+      out << "declare: from " << problem.transitions.size() << " transitions, an estimate and no proof\n";
+      PrintSlopes(proposal, config, out);
+      PrintLoneSlopes(lone_slopes, config, out);
+      PrintErrors(proposal, *problem.model, out);
+      PrintTrades(proposal, *problem.model, command.factor, out);
+      PrintMeaning(proposal, *problem.model, command, out);
+      PrintRegions(regions, command, out);
+      if (held_out.slices() > 0) out << "With every other block of time as observations: " << TextOf(held_out) << ".\n";
+      out << "\ndeclaration:\n" << DeclarationYaml(proposal.declaration, *problem.model) << std::flush;
     }
     Warn(held_out);
     for (const std::string& file : pictures)

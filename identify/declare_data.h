@@ -1,7 +1,6 @@
 /** `forereach declare --from-data`. */
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 

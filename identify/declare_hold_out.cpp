@@ -5,7 +5,6 @@
 #include <optional>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "command_line/progress.h"
@@ -135,8 +134,8 @@ void WarnOfLeft(const std::vector<Trial>& trials) {
   std::string text;
   for (const Trial& trial : trials)
     if (trial.left() > 0)
-      text +=
-          (text.empty() ? "" : ", ") + LeftText(trial.left(), trial.slices()) + " at factor " + ToText(trial.factor);
+      text += fmt::format("{}{} at factor {}", text.empty() ? "" : ", ", LeftText(trial.left(), trial.slices()),
+                          ToText(trial.factor));
   if (!text.empty())
     std::cerr << "forereach: warning: the slices of their certificates were left by " << text
               << ". A declaration whose slices lose the robot is false, whatever it certifies" << std::endl;
@@ -229,7 +228,7 @@ Chart ChartOf(const std::vector<Trial>& trials, const DataCommand& command) {
               .y_name = "% of held-out data",
               .x = {},
               .series = {{"blocks with a contradiction", {}},
-                         {"their bound, " + ToText(100 * command.confidence) + " %", {}},
+                         {fmt::format("their bound, {} %", ToText(100 * command.confidence)), {}},
                          {"stretches certified, if the declaration is true", {}},
                          {"states inside or consistent with their slice", {}}}};
   for (const Trial& trial : trials) {
@@ -249,8 +248,8 @@ int DeclareHoldOut(const DataCommand& command) {
   const Config config = LoadForSlopes(command.config);
   const Problem& problem = *config.problem;
   if (command.blocks > problem.transitions.size())
-    throw ConfigError(
-        fmt::format("--blocks: {} is more than the task's {} transitions", command.blocks, problem.transitions.size()));
+    throw ConfigError("--blocks: {} is more than the task's {} transitions", command.blocks,
+                      problem.transitions.size());
   const Split split = SplitByTime(problem.transitions.size(), command.blocks);
   std::optional<Progress> progress(std::in_place, "parts of the work",
                                    2 * ToSize(problem.model->num_states()) + std::size(kFactors));
@@ -299,6 +298,7 @@ HeldOutSteps JudgeByHeldOut(const Config& config, const Declaration& declaration
   if (transitions.size() < 2) return found;
   const Split split = SplitByTime(transitions.size(), std::min(kBlocks, transitions.size()));
   std::vector<Commands> commands;
+  // Shorter stretches where the record has no longer ones.
   for (found.steps = 10; commands.empty() && found.steps > 0; --found.steps)
     commands = CommandsOf(transitions, config.period, split, found.steps);
   ++found.steps;

@@ -8,7 +8,6 @@
 #include <stdexcept>
 
 #include <fmt/format.h>
-
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <unsupported/Eigen/NonLinearOptimization>
@@ -189,7 +188,8 @@ bool RunsAway(const Residuals& problem, const Eigen::VectorXd& x, const Eigen::V
 void RequireDerivatives(const Residuals& problem, const Eigen::VectorXd& x, const std::vector<std::string>& names) {
   for (Eigen::Index c = 0; c < x.size(); ++c)
     if (!HasDerivative(problem, x, c))
-      RefuseDerivative("the model has no derivative by '" + names[ToSize(c)] + "' at", x[c] * problem.unit(ToSize(c)));
+      RefuseDerivative(fmt::format("the model has no derivative by '{}' at", names[ToSize(c)]),
+                       x[c] * problem.unit(ToSize(c)));
 }
 
 // The solver never moves a parameter that begins where its derivative is zero.
@@ -197,7 +197,7 @@ void RequireEffects(const Residuals& problem, const Eigen::VectorXd& x, const st
   const Residuals::Derivatives derivatives = problem.DerivativesAt(x);
   for (Eigen::Index c = 0; c < x.size(); ++c)
     if (derivatives.columns.col(c).norm() <= 2 * derivatives.noise[c] && HasEffectElsewhere(problem, x, c))
-      RefuseDerivative("'" + names[ToSize(c)] + "' has no effect near", x[c] * problem.unit(ToSize(c)));
+      RefuseDerivative(fmt::format("'{}' has no effect near", names[ToSize(c)]), x[c] * problem.unit(ToSize(c)));
 }
 
 void RefuseRunaways(const Residuals& problem, const Eigen::VectorXd& x, const std::vector<std::string>& names) {
@@ -215,8 +215,9 @@ void RefuseRunaways(const Residuals& problem, const Eigen::VectorXd& x, const st
     }
   }
   if (!all.empty() && RunsAway(problem, x, far))
-    throw std::invalid_argument("the transitions do not bound " + all +
-                                ": the fit gets no worse the farther it goes; begin elsewhere, or leave it out");
+    throw std::invalid_argument(fmt::format(
+        "the transitions do not bound {}: the fit gets no worse the farther it goes; begin elsewhere, or leave it out",
+        all));
 }
 
 // What the derivatives at the solution say of the parameters.
@@ -233,10 +234,12 @@ Eigen::VectorXd DeviationsOf(const Eigen::MatrixXd& G, const Eigen::VectorXd& le
   const Eigen::RowVectorXd lengths = G.colwise().norm();
   Eigen::VectorXd variances = Eigen::VectorXd::Zero(G.cols());
   for (Eigen::Index k = 0; k < states; ++k) {
+    // Degrees of freedom of this state's errors. Without one, nothing shows how large they are.
     const double left = static_cast<double>(rows) - leverages.segment(k * rows, rows).sum();
     const double variance = left > 1 - kShare ? values.segment(k * rows, rows).squaredNorm() / left
                                               : std::numeric_limits<double>::quiet_NaN();
     for (Eigen::Index c = 0; c < G.cols(); ++c)
+      // A state that says nothing of the parameter adds nothing, even if its own noise is unknown.
       if (const double length = G.col(c).segment(k * rows, rows).norm(); length > kShare * lengths[c])
         variances[c] += variance * length * length;
   }
@@ -292,11 +295,11 @@ std::vector<std::size_t> PlacesOf(const ModelText& text, const std::vector<std::
   std::vector<std::size_t> places;
   for (const std::string& name : names) {
     const auto at = std::ranges::find(text.parameters, name, &ModelText::Parameter::name);
-    if (at == text.parameters.end()) throw std::invalid_argument("the model has no parameter '" + name + "'");
+    if (at == text.parameters.end()) throw std::invalid_argument(fmt::format("the model has no parameter '{}'", name));
     if (name == "dt") throw std::invalid_argument("dt is the step, which no transition says");
     const auto place = ToSize(at - text.parameters.begin());
     if (std::ranges::find(places, place) != places.end())
-      throw std::invalid_argument("parameter '" + name + "' is given twice");
+      throw std::invalid_argument(fmt::format("parameter '{}' is given twice", name));
     places.push_back(place);
   }
   if (places.empty()) throw std::invalid_argument("no parameter to fit");

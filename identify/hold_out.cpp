@@ -29,6 +29,7 @@ Observations Joined(const Observations& a, const Observations& b) {
 void Mark(const Declaration& declaration, const Observations& all, int first, int k, std::vector<bool>& contradicts) {
   const LipschitzRow row(declaration, k);
   const auto test = [&](int i, int j) { return TestPair(declaration, all, i, j, k).has_value(); };
+  // Then all pairs count alike, and the two extremes contradict if any does.
   if (row.is_constant()) {
     int highest = 0, lowest = 0;
     for (int i = 1; i < first; ++i) {
@@ -102,6 +103,7 @@ std::vector<HoldOutWindow> WindowsOf(const Transitions& transitions, const Split
   const Eigen::Index n = transitions.x_next.cols();
   for (const Split::Block& block : split.judge)
     for (int begin = block.begin, i = begin; i < block.end; ++i) {
+      // It does not begin where the one before it ended: a row was lost, or another log begins.
       if (i > begin && transitions.z.row(i).head(n) != transitions.x_next.row(i - 1)) begin = i;
       if (i + 1 - begin < steps) continue;
       windows.push_back({begin, steps});

@@ -5,12 +5,10 @@
 #include <cmath>
 #include <numbers>
 #include <span>
-#include <stdexcept>
 
 #include <fmt/format.h>
 
 #include "forereach/certify/learned.h"
-#include "forereach/dynamics/step_rate.h"
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
@@ -114,9 +112,9 @@ class Importer {
         broken = true;
         continue;
       }
-      if (!has_origin)
+      if (!has_origin) {
         origin = time, has_origin = true;
-      else if (time < last) {
+      } else if (time < last) {  // two runs in one file, or a clock that was set: no transition spans it
         Drop(Dropped::kBackwards, row);
         broken = true;
       }
@@ -158,15 +156,15 @@ class Importer {
     log_.typical_spacing = MedianOf(spacings);
     if (!(log_.typical_spacing > (1 + kJitter) * options_.period + options_.tolerance)) return;
     if (const Finding& back = log_.At(Dropped::kBackwards); back.count > 0)
-      throw ConfigError(fmt::format(
+      throw ConfigError(
           "{}: its stamps go back, {} times, first in line {}, and between these lines its rows are typically {:.6g} s "
           "apart, more than a step of the task, {} s: sort the rows by their stamps if they are of one run",
-          table_.path, back.count, back.first_line, log_.typical_spacing, ToText(options_.period)));
+          table_.path, back.count, back.first_line, log_.typical_spacing, ToText(options_.period));
     throw ConfigError(
-        fmt::format("{}: its rows are typically {:.6g} s apart, and a step of the task is {} s; states are not "
-                    "interpolated: record faster, or let model.dt be a multiple of the log's spacing; if the stamps "
-                    "are not in s, give their unit with --time-unit",
-                    table_.path, log_.typical_spacing, ToText(options_.period)));
+        "{}: its rows are typically {:.6g} s apart, and a step of the task is {} s; states are not "
+        "interpolated: record faster, or let model.dt be a multiple of the log's spacing; if the stamps "
+        "are not in s, give their unit with --time-unit",
+        table_.path, log_.typical_spacing, ToText(options_.period));
   }
 
   // ---- samples to transitions
@@ -299,6 +297,7 @@ class Importer {
     numbers_.insert(numbers_.end(), location.begin(), location.end());
     numbers_.insert(numbers_.end(), successor.begin(), successor.end());
     log_.lines.push_back(LineOf(samples_[i].row));
+    // Transitions may share samples, and each counts once.
     log_.rows_used += CountStates(std::max(i, next_unused_), j + 1);
     next_unused_ = j + 1;
     longer_.push_back(longer);
@@ -337,7 +336,7 @@ class Importer {
     for (std::size_t l = 0; l < z.size(); ++l) point[l] = Interval(z[l]);
     const DomainExit exit = FindExit(problem_.domain, {point.data(), z.size()});
     if (exit.kind != DomainExit::Kind::kLower && exit.kind != DomainExit::Kind::kUpper) return "";
-    return problem_.model->variable_names()[ToSize(exit.index)] + " " + ToText(z[ToSize(exit.index)]);
+    return fmt::format("{} {}", problem_.model->variable_names()[ToSize(exit.index)], ToText(z[ToSize(exit.index)]));
   }
 
   const LogTable& table_;

@@ -13,7 +13,6 @@ and t_i + dt, and the true input differs from u. */
 
 #include <cstdint>
 #include <limits>
-#include <string>
 #include <utility>
 #include <vector>
 

@@ -4,8 +4,6 @@
 #include <limits>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "forereach/numerics/size.h"
 #include "task/config_error.h"
 
@@ -20,8 +18,8 @@ void RequireSorted(const LogTable& table) {
     const double stamp = table.values(row, 0);
     if (std::isnan(stamp)) continue;
     if (stamp < last)
-      throw ConfigError(fmt::format("{}:{}: the stamps go back; only rows in the order of their stamps can be joined",
-                                    table.path, table.lines[ToSize(row)]));
+      throw ConfigError("{}:{}: the stamps go back; only rows in the order of their stamps can be joined", table.path,
+                        table.lines[ToSize(row)]);
     last = stamp;
   }
 }
@@ -45,6 +43,7 @@ std::vector<Command> CommandsOf(const LogTable& table) {
     is_lost = false;
     if (commands.empty() || commands.back().stamp < stamp)
       commands.push_back({stamp, table.lines[ToSize(row)], inputs});
+    // Of two commands at one time nobody knows which one holds.
     else if (commands.back().inputs != inputs)
       commands.back().inputs.setConstant(kUnknown);
   }
@@ -71,6 +70,7 @@ class LogJoiner {
       for (; next_ < commands_.size() && commands_[next_].stamp <= stamp; ++next_) {  // not for NaN
         held_ = commands_[next_].inputs;
         nothing[0] = commands_[next_].stamp;
+        // A row of its own, so that a command that changes within a step is seen.
         if (row > 0 && commands_[next_].stamp < stamp) Add(nothing, commands_[next_].line, false, true);
       }
       Add(states_.values.row(row), states_.lines[ToSize(row)], states_.after_loss[ToSize(row)], false);

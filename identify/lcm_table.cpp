@@ -1,7 +1,5 @@
 #include "identify/lcm_table.h"
 
-#include <fmt/format.h>
-
 #include "identify/channel_table.h"
 #include "records/event_log.h"
 #include "task/config_error.h"
@@ -23,9 +21,8 @@ LogTable ReadLcmLog(const std::string& path, const std::vector<std::string>& wan
     if (!table.Takes(event.channel)) continue;
     const std::optional<std::string> type = types.TypeOf(event.data);
     if (!type && !first_type)
-      throw ConfigError(fmt::format("{}: no type of the given .lcm files has the fingerprint of the messages on {}: {}",
-                                    path, event.channel,
-                                    types.size() == 0 ? "give --lcm-types" : "theirs are others or older"));
+      throw ConfigError("{}: no type of the given .lcm files has the fingerprint of the messages on {}: {}", path,
+                        event.channel, types.size() == 0 ? "give --lcm-types" : "theirs are others or older");
     if (!first_type) first_type = type;
     const auto values = type == first_type ? types.Read(*type, table.places(), event.data) : std::nullopt;
     if (values)

@@ -78,15 +78,13 @@ class LcmTypes::Parser {
         Next();
         ParseStruct();
       } else {
-        Fail("'" + token_ + "' is neither package nor struct");
+        Fail(fmt::format("'{}' is neither package nor struct", token_));
       }
     }
   }
 
  private:
-  [[noreturn]] void Fail(const std::string& what) const {
-    throw ConfigError(fmt::format("{}:{}: {}", path_, line_, what));
-  }
+  [[noreturn]] void Fail(const std::string& what) const { throw ConfigError("{}:{}: {}", path_, line_, what); }
 
   void Skip(std::size_t end) {
     end = std::min(end, text_.size());
@@ -119,13 +117,13 @@ class LcmTypes::Parser {
   }
 
   std::string Name() {
-    if (token_.empty() || !IsWord(token_[0]) || IsDigit(token_[0])) Fail("'" + token_ + "' is no name");
+    if (token_.empty() || !IsWord(token_[0]) || IsDigit(token_[0])) Fail(fmt::format("'{}' is no name", token_));
     std::string name = token_;
     Next();
     return name;
   }
   void Expect(const char* what) {
-    if (token_ != what) Fail("'" + token_ + "' stands where " + what + " has to be");
+    if (token_ != what) Fail(fmt::format("'{}' stands where {} has to be", token_, what));
     Next();
   }
 
@@ -135,7 +133,7 @@ class LcmTypes::Parser {
     constants_.clear();
     Expect("{");
     while (token_ != "}") {
-      if (token_.empty()) Fail("the file ends inside " + name);
+      if (token_.empty()) Fail(fmt::format("the file ends inside {}", name));
       if (token_ == "const")
         ParseConstants();
       else
@@ -143,7 +141,7 @@ class LcmTypes::Parser {
     }
     Next();
     if (token_ == ";") Next();
-    if (!structs_.emplace(name, std::move(type)).second) Fail(name + " is defined twice");
+    if (!structs_.emplace(name, std::move(type)).second) Fail(fmt::format("{} is defined twice", name));
   }
 
   void ParseConstants() {
@@ -169,8 +167,8 @@ class LcmTypes::Parser {
         const auto constant = constants_.find(token_);
         const auto [value, problem] = ParseInteger(constant == constants_.end() ? token_ : constant->second);
         const bool is_member = std::ranges::any_of(type.members, [&](const Member& m) { return m.name == token_; });
-        if (!problem.empty() && !is_member) Fail("'" + token_ + "' is no size, and no member before it");
-        if (problem.empty() && value < 0) Fail("the size " + token_ + " is negative");
+        if (!problem.empty() && !is_member) Fail(fmt::format("'{}' is no size, and no member before it", token_));
+        if (problem.empty() && value < 0) Fail(fmt::format("the size {} is negative", token_));
         member.dimensions.push_back({problem.empty(), token_, problem.empty() ? value : 0});
         Next();
         Expect("]");
@@ -272,14 +270,14 @@ std::string LcmTypes::Resolved(const std::string& type, const std::string& user)
   const std::string own = user.substr(0, user.rfind('.') + 1) + type;
   if (structs_.contains(own)) return own;
   if (structs_.contains(type)) return type;
-  throw ConfigError("type " + user + " uses " + type + ", which no given .lcm file defines");
+  throw ConfigError("type {} uses {}, which no given .lcm file defines", user, type);
 }
 
 std::uint64_t LcmTypes::HashOf(const std::string& type, std::vector<std::string>& outer, int& hashed) const {
   if (std::ranges::find(outer, type) != outer.end()) return 0;
   if (outer.size() > kDeepestType || ++hashed > kMostHashed)
-    throw ConfigError(fmt::format("type {} nests too much: more than {} types in one another, or {} in all",
-                                  outer.empty() ? type : outer.front(), kDeepestType, kMostHashed));
+    throw ConfigError("type {} nests too much: more than {} types in one another, or {} in all",
+                      outer.empty() ? type : outer.front(), kDeepestType, kMostHashed);
   std::int64_t own = 0x12345678;
   for (const Member& member : structs_.at(type).members) {
     own = Updated(own, member.name);
@@ -319,12 +317,12 @@ std::optional<std::vector<double>> LcmTypes::Read(const std::string& type, const
       const std::size_t end = std::min(place.find('.', begin), place.size());
       member_name = place.substr(begin, std::min(place.find('[', begin), end) - begin);
       const auto known = structs_.find(user);
-      if (known == structs_.end()) throw ConfigError(fmt::format("type {} is not defined", user));
+      if (known == structs_.end()) throw ConfigError("type {} is not defined", user);
       const std::vector<Member>& members = known->second.members;
       const auto member = std::ranges::find(members, member_name, &Member::name);
       const bool is_last = end == place.size();
       if (member == members.end() || member->type == "string" || is_last != (PrimitiveOf(member->type) != nullptr))
-        throw ConfigError(fmt::format("type {} has no number {}", type, place));
+        throw ConfigError("type {} has no number {}", type, place);
       if (!is_last) user = Resolved(member->type, user);
       begin = end + 1;
     }

@@ -161,16 +161,16 @@ class Reader {
   void ReadLines(const Condition& goes_on) {
     for (std::string line; goes_on() && lines_.Next(line);) {
       if (const std::string why = lines_.line() == 1 ? WhyNoText(line) : ""; !why.empty())
-        throw ConfigError(table_.path + ": " + why);
+        throw ConfigError("{}: {}", table_.path, why);
       if (IsRow(line)) Take(line);
     }
     if (parser_ && !parser_->is_complete()) Fail(first_line_, "a quoted field begins in this row and does not end");
     if (num_fields_ == 0)
-      throw ConfigError(table_.path + ":1: no line that names the columns; give their names with --header");
+      throw ConfigError("{}:1: no line that names the columns; give their names with --header", table_.path);
   }
 
   [[noreturn]] void Fail(int line, const std::string& what) const {
-    throw ConfigError(fmt::format("{}:{}: {}", table_.path, line, what));
+    throw ConfigError("{}:{}: {}", table_.path, line, what);
   }
 
   // Whether the line is a row or a part of one, and not blank or a comment.
@@ -191,8 +191,9 @@ class Reader {
     if (!parser_) parser_ = std::make_unique<RowParser>(DelimiterOf(line));
     if (const std::string problem = parser_->Feed(line); !problem.empty()) {
       if (num_fields_ == 0)
-        Fail(first_line_, "the names of the columns: " + problem +
-                              (line.find('\r') == std::string::npos ? "" : "; `tr '\\r' '\\n'` makes lines of it"));
+        Fail(first_line_,
+             fmt::format("the names of the columns: {}{}", problem,
+                         line.find('\r') == std::string::npos ? "" : "; `tr '\\r' '\\n'` makes lines of it"));
       Lose(problem);
     } else if (parser_->is_complete()) {
       if (num_fields_ == 0)
@@ -213,7 +214,7 @@ class Reader {
     }
     if (found.size() > 1)
       Fail(first_line_,
-           "the fields may be separated by " + Name(found[0]) + " or by " + Name(found[1]) + "; say which it is");
+           fmt::format("the fields may be separated by {} or by {}; say which it is", Name(found[0]), Name(found[1])));
     if (!found.empty()) return found[0];
     return Trimmed(line).find(' ') == std::string_view::npos ? ',' : ' ';
   }
@@ -269,7 +270,7 @@ class Reader {
         const auto count = std::ranges::count(names, name);
         if (count == 0) {
           const std::string why = WhyNoHeader(names);
-          Fail(line, why.empty() ? "no column '" + name + "'; " + Suggestion(name, names) : why);
+          Fail(line, why.empty() ? fmt::format("no column '{}'; {}", name, Suggestion(name, names)) : why);
         }
         if (count > 1) Fail(line, fmt::format("{} columns are named '{}'", count, name));
         places.push_back(static_cast<std::size_t>(std::ranges::find(names, name) - names.begin()));
@@ -286,7 +287,7 @@ class Reader {
           {',', "commas"}, {';', "semicolons"}, {'\t', "tabs"}, {' ', "blanks"}};
       for (const auto& [separator, name] : kSeparators)
         if (fields[0].find(separator) != std::string::npos)
-          return std::string("the fields seem to be separated by ") + name;
+          return fmt::format("the fields seem to be separated by {}", name);
     }
     if (!std::ranges::all_of(fields, IsNumber)) return "";
     return "this line has numbers only, so no column has a name; give the names with --header";
@@ -305,6 +306,7 @@ class Reader {
   bool IsSecondHeader(const std::vector<std::string>& fields) {
     if (std::ranges::any_of(fields, IsNumber)) return false;
     if (fields == header_) {
+      // A recorder began anew here: no transition spans that.
       table_.headers.Add(first_line_);
       lost_ = true;
       return true;
@@ -393,14 +395,15 @@ WantedColumn::WantedColumn(const std::string& text) : names_{text} {
   }
   const std::size_t count = arguments.size();
   if (function == "yaw_of" && count != 2 && count != 4)
-    throw ConfigError(text + ": has to be yaw_of(qx,qy,qz,qw), or yaw_of(qz,qw) of a turn about z alone");
-  if (function == "seconds_of" && count != 2) throw ConfigError(text + ": has to be seconds_of(SECONDS,NANOSECONDS)");
+    throw ConfigError("{}: has to be yaw_of(qx,qy,qz,qw), or yaw_of(qz,qw) of a turn about z alone", text);
+  if (function == "seconds_of" && count != 2) throw ConfigError("{}: has to be seconds_of(SECONDS,NANOSECONDS)", text);
   kind_ = function == "seconds_of" ? Kind::kSeconds : count == 2 ? Kind::kHalfYaw : Kind::kYaw;
   names_ = std::move(arguments);
 }
 
 double WantedColumn::Of(const std::vector<double>& v) const {
   const auto if_unit = [](double square, double yaw) {
+    // Room for a quaternion of few digits; farther off it is no rotation.
     constexpr double kOff = 0.01;
     return std::abs(std::sqrt(square) - 1) <= kOff ? yaw : std::numeric_limits<double>::quiet_NaN();
   };

@@ -4,7 +4,6 @@
 #include <zstd.h>
 
 #include <algorithm>
-#include <array>
 #include <concepts>
 #include <memory>
 #include <span>
@@ -76,7 +75,7 @@ void Unpack(const std::string& compression, std::string_view packed, std::span<c
       packed.remove_prefix(in);
     }
   } else {
-    throw Damage("a chunk compressed by " + compression + ", which is none of lz4 and zstd");
+    throw Damage(fmt::format("a chunk compressed by {}, which is none of lz4 and zstd", compression));
   }
   if (size != to.size()) throw Damage("a chunk of another size than it says");
 }
@@ -86,7 +85,7 @@ void Unpack(const std::string& compression, std::string_view packed, std::span<c
 McapReader::McapReader(const std::string& path) : file_(path, kLargestMcap) {
   std::string magic;
   if (ReadUpTo(mcap::kMagic.size(), magic) < mcap::kMagic.size() || magic != mcap::kMagic)
-    throw ConfigError(path + ": does not begin as an MCAP file does");
+    throw ConfigError("{}: does not begin as an MCAP file does", path);
 }
 
 McapReader::Status McapReader::Next() {

@@ -4,7 +4,6 @@
 #include <optional>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "identify/channel_table.h"
@@ -55,13 +54,13 @@ class McapTableReader {
     }
     LogTable table = table_.Finish();
     for (std::size_t j = 0; j < places_.size(); ++j)
-      if (!is_found_[j] && !table.lines.empty()) Fail("no message has a number " + table_.places()[j]);
+      if (!is_found_[j] && !table.lines.empty()) Fail(fmt::format("no message has a number {}", table_.places()[j]));
     return table;
   }
 
  private:
   [[noreturn]] void Fail(const std::string& what) const {
-    throw ConfigError(table_.path() + ": " + table_.channel() + ": " + what);
+    throw ConfigError("{}: {}: {}", table_.path(), table_.channel(), what);
   }
 
   std::optional<std::vector<double>> Values() {
@@ -70,7 +69,7 @@ class McapTableReader {
       first_ = &channel;
       if (channel.encoding == "cdr") ReadSchema(channel);
       if (channel.encoding != "cdr" && channel.encoding != "json")
-        Fail("its messages are encoded as '" + channel.encoding + "', json and cdr are read");
+        Fail(fmt::format("its messages are encoded as '{}', json and cdr are read", channel.encoding));
     }
     const bool is_alike = channel.encoding == first_->encoding &&
                           (type_ ? channel.schema && channel.schema->text == first_->schema->text : true);
@@ -81,8 +80,8 @@ class McapTableReader {
   void ReadSchema(const McapChannel& channel) {
     const McapChannel::Schema* const schema = channel.schema;
     if (!schema || schema->encoding != "ros2msg")
-      Fail("its messages have " + (schema ? "a schema in '" + schema->encoding + "'" : std::string("no schema")) +
-           ", ros2msg is read");
+      Fail(fmt::format("its messages have {}, ros2msg is read",
+                       schema ? fmt::format("a schema in '{}'", schema->encoding) : std::string("no schema")));
     try {
       type_.emplace(schema->name, schema->text);
       for (const auto& place : places_) type_->RequireNumber(place);

@@ -27,7 +27,7 @@ std::vector<PlaceStep> StepsOf(std::string_view place) {
     }
     if (rest.empty()) return steps;
   }
-  throw ConfigError("'" + std::string(place) + "' is no place in a message, such as pose.position[0]");
+  throw ConfigError("'{}' is no place in a message, such as pose.position[0]", place);
 }
 
 }  // namespace forereach

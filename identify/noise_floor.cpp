@@ -11,6 +11,7 @@
 namespace forereach {
 namespace {
 
+// The Gamma test compares each with each.
 constexpr int kNeighbours = 10, kMostObservations = 2000;
 
 // Among observations that agree in all columns: the one with the largest floor and the one with the least ceiling.
@@ -66,6 +67,7 @@ double GammaTest(const Observations& observations, int k, const std::vector<int>
   }
   const double mean = distance.mean(), spread = (distance - mean).square().sum();
   const double slope = spread > 0 ? ((distance - mean) * difference).sum() / spread : 0;
+  // The line at distance 0; by chance it may be below zero there.
   return std::sqrt(std::max(0.0, difference.mean() - slope * mean));
 }
 
@@ -75,6 +77,7 @@ Eigen::RowVectorXd ScalesOf(const Observations& observations) {
   const Eigen::MatrixXd& z = observations.z;
   Eigen::RowVectorXd scales(z.cols());
   for (Eigen::Index l = 0; l < z.cols(); ++l) {
+    // Exactly: the mean of equal numbers may be off by a rounding, and would give them a scale.
     const bool constant = (z.col(l).array() == z(0, l)).all();
     const Eigen::ArrayXd about = z.col(l).array() - z.col(l).mean();
     scales[l] = constant ? 0 : std::sqrt(about.square().mean());

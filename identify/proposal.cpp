@@ -11,6 +11,7 @@
 namespace forereach {
 namespace {
 
+// The estimators compare each with each.
 constexpr int kMostForEstimators = 1000;
 
 // A double that is at least x and prints with few digits.
@@ -83,6 +84,7 @@ ProposedDeclaration Propose(const Declaration& declaration, const Observations& 
     row.noise = FindNoiseFloor(observations, k, options.columns[ToSize(k)]);
     if (const double shown = std::max(row.noise.repeated, 3 * row.noise.deviation);
         options.estimate_noise && shown > proposed.noise_bound[k]) {
+      // As it will be printed: the slopes have to hold with the number that is copied.
       proposed.noise_bound[k] = Rounded(shown);
       row.is_raised = true;
     }

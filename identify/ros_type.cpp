@@ -82,8 +82,7 @@ RosType::RosType(std::string name, std::string_view text) : name_(Short(name)) {
   for (const auto& [user, members] : types_)
     for (const Member& member : members)
       if (!FindRosPrimitive(member.type) && !types_.contains(member.type))
-        throw ConfigError(
-            fmt::format("the schema of {} lacks the type {} of {}.{}", name_, member.type, user, member.name));
+        throw ConfigError("the schema of {} lacks the type {} of {}.{}", name_, member.type, user, member.name);
   if (!types_.contains(name_)) throw ConfigError("a schema without a name");
 }
 
@@ -97,9 +96,7 @@ void RosType::AddText(const std::string& type, std::string_view text, int line) 
     if (rest.empty()) continue;
     std::string_view kind = TakeWord(rest);
     const std::string_view name = TakeWord(rest);
-    const auto fail = [&](const char* what) {
-      throw ConfigError(fmt::format("the schema of {}, line {}: {}", name_, line, what));
-    };
+    const auto fail = [&](const char* what) { throw ConfigError("the schema of {}, line {}: {}", name_, line, what); };
     if (name.empty()) fail("a type without the name of a member");
     if (name.find('=') != std::string_view::npos || Trimmed(rest).starts_with('=')) continue;  // a constant
     Member member{"", std::string(name)};
@@ -126,7 +123,7 @@ void RosType::RequireNumber(const std::vector<PlaceStep>& place) const {
   bool is_array = false;
   for (const PlaceStep& step : place) {
     if (step.name.empty()) {
-      if (!std::exchange(is_array, false)) throw ConfigError(at + " of " + name_ + " is no array");
+      if (!std::exchange(is_array, false)) throw ConfigError("{} of {} is no array", at, name_);
       at += fmt::format("[{}]", step.entry);
       continue;
     }
@@ -135,14 +132,14 @@ void RosType::RequireNumber(const std::vector<PlaceStep>& place) const {
     at += (at.empty() ? "" : ".") + step.name;
     if (!members || member == members->end()) {
       const std::string names = Joined(members ? *members : Members(), [](const Member& each) { return each.name; });
-      throw ConfigError(fmt::format("{} has no {}{}", name_, at, names.empty() ? "" : "; there are " + names));
+      throw ConfigError("{} has no {}{}", name_, at, names.empty() ? "" : fmt::format("; there are {}", names));
     }
     type = member->type;
     is_array = member->count != Member::Count::kOne;
   }
   const RosPrimitive* const primitive = FindRosPrimitive(type);
   if (is_array || !primitive || primitive->form == RosForm::kText)
-    throw ConfigError(fmt::format("{} of {} is no number but {}{}", at, name_, type, is_array ? "[]" : ""));
+    throw ConfigError("{} of {} is no number but {}{}", at, name_, type, is_array ? "[]" : "");
 }
 
 // Walks through a message once. What of the wanted places begins with the present one is a range of them.

@@ -65,6 +65,7 @@ double ExtremeValueEnd(std::vector<double> maxima) {
     b1 += maxima[i] / n * j / (n - 1);
     b2 += maxima[i] / n * j * (j - 1) / ((n - 1) * (n - 2));
   }
+  // Equal maxima have no spread to extrapolate.
   if (!(largest > maxima.front())) return largest;
   const double c = (2 * b1 - b0) / (3 * b2 - b0) - std::log(2.0) / std::log(3.0);
   const double shape = 7.8590 * c + 2.9554 * c * c;

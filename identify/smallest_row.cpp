@@ -17,6 +17,7 @@
 namespace forereach {
 namespace {
 
+// Few at a time: the next row satisfies most of the others, too.
 constexpr std::size_t kCutsInARound = 60;
 constexpr int kMostRounds = 500;
 constexpr double kTolerance = 1e-9;  // of the program, whose numbers are made to be about 1
@@ -105,6 +106,7 @@ class SmallestRowSearch {
       if (violated.empty()) break;
       for (const ObservedPair& pair : violated) {
         const std::vector<double> coefficients = CoefficientsOf(pair);
+        // Two that agree in all free columns: no slope explains that they differ.
         if (std::ranges::all_of(coefficients, [](double value) { return value == 0; })) {
           found.unexplained = pair;
           return;
@@ -176,12 +178,14 @@ class SmallestRowSearch {
       if (c < kept)
         pairs.push_back(pair);
       else
+        // It may be among the most violated of a later row.
         known_.erase(std::minmax(ToSize(pair.first), ToSize(pair.second)));
     }
     return pairs;
   }
 
   void FindReasons(const LinearProgram& program, SmallestRow& found) const {
+    // By duality, a cut's price says how much of the optimum it forces.
     std::vector<double> largest(found.reasons.size(), 0);
     for (std::size_t p = 0; p < cuts_.size(); ++p)
       for (const Eigen::Index l : free_) {

@@ -7,7 +7,6 @@ of s_l L_kl for any s_l >= 0: the smallest value of that sum over all consistent
 or exceeds. The program finds it, with the row where it is. This is a fact about the data and proves no upper bound. */
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <vector>
 

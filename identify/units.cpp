@@ -3,6 +3,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include <fmt/core.h>
+
 #include "command_line/nearest.h"
 #include "task/number.h"
 
@@ -38,20 +40,20 @@ const std::vector<Unit>& KnownUnits() {
 
 long double FactorOf(const std::string& unit, const std::string& base) {
   if (const auto [factor, problem] = ParseNumber(unit); problem.empty()) {
-    if (!(factor > 0)) throw std::invalid_argument("'" + unit + "': a factor is above 0");
+    if (!(factor > 0)) throw std::invalid_argument(fmt::format("'{}': a factor is above 0", unit));
     return factor;
   }
   for (const Unit& known : KnownUnits()) {
     if (unit == known.base && (base.empty() || base == unit)) return 1;
     if (unit != known.name) continue;
     if (base.empty() || base == known.base) return known.factor;
-    throw std::invalid_argument("'" + unit + "' is " + known.base + ", and the model has " + base);
+    throw std::invalid_argument(fmt::format("'{}' is {}, and the model has {}", unit, known.base, base));
   }
   if (!unit.empty() && unit == base) return 1;
   std::vector<std::string> names;
   for (const Unit& known : KnownUnits()) names.emplace_back(known.name);
-  throw std::invalid_argument("'" + unit + "' is no unit that is known here, and no factor; " +
-                              Suggestion(unit, names));
+  throw std::invalid_argument(
+      fmt::format("'{}' is no unit that is known here, and no factor; {}", unit, Suggestion(unit, names)));
 }
 
 }  // namespace forereach

@@ -5,6 +5,7 @@
 #include <exception>
 #include <utility>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/candidate_message.h"
@@ -102,7 +103,8 @@ const Config* Watcher::Find(const Digest& config) {
   if (config == tried_ || (tried_us_ != 0 && TimeApart(now_us_, tried_us_) < kReadsAgainAfterUs)) return nullptr;
   tried_ = config;
   tried_us_ = now_us_;
-  other_task_ = "the certifier's task file is not " + task().path + " as it is now: tubes and names may be wrong";
+  other_task_ =
+      fmt::format("the certifier's task file is not {} as it is now: tubes and names may be wrong", task().path);
   try {
     if (tasks_.size() == kMostTasks) throw ConfigError("it was read again too often: start this program again");
     auto again = Named(read_again_());
@@ -111,7 +113,7 @@ const Config* Watcher::Find(const Digest& config) {
     other_task_.clear();
     return &task();
   } catch (const std::exception& error) {
-    other_task_ += " (" + WhyFailed(error) + ")";
+    other_task_ += fmt::format(" ({})", WhyFailed(error));
     return nullptr;
   }
 }
@@ -289,7 +291,7 @@ void Watcher::Draw(const Decided& decided, PageDetail& detail) {
         CertifyInPieces(certifier, plan, initial_set, *basis.obstacles, MostPieces(decision.outcome, gate), *tube_);
     Describe(certifier, judged, again, *tube_, *basis.obstacles, detail);
   } catch (const std::invalid_argument& error) {
-    detail.missing = std::string("it cannot be judged again: ") + error.what();
+    detail.missing = fmt::format("it cannot be judged again: {}", error.what());
   }
 }
 
@@ -311,7 +313,7 @@ void Watcher::DrawBoxes(const Decided& decided, PageDetail& detail) const {
   detail.step_us = certified->plan.step_us;
   detail.steps = certified->plan.num_steps;
   if (DrawTube(units, {}, *decided.recorded.basis.obstacles, -1, detail))
-    detail.missing = "the boxes of its certificate, without the body; " + detail.missing;
+    detail.missing = fmt::format("the boxes of its certificate, without the body; {}", detail.missing);
 }
 
 Json Watcher::DecisionJson(const Decided& decided, bool is_drawn) {

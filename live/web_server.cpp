@@ -111,7 +111,7 @@ class WebServer::Content {
                                               "no",
                                               nullptr};
     context_ = mg_start(&callbacks, this, const_cast<const char**>(options.data()));
-    if (!context_) throw ServerError(address + ": the page cannot be served there: " + problem_);
+    if (!context_) throw ServerError(fmt::format("{}: the page cannot be served there: {}", address, problem_));
     mg_server_port used{};
     if (mg_get_server_ports(context_, 1, &used) == 1) port_ = used.port;
   }
@@ -154,7 +154,7 @@ class WebServer::Content {
       Watcher::Cursor cursor;
       while (!is_over_) {
         const std::string news = watcher_.Since(cursor);
-        const std::string event = news.empty() ? ":\n\n" : "data: " + news + "\n\n";
+        const std::string event = news.empty() ? ":\n\n" : fmt::format("data: {}\n\n", news);
         if (mg_write(connection, event.data(), event.size()) <= 0) break;
         std::this_thread::sleep_for(std::chrono::milliseconds(kUpdateMs));
       }

@@ -41,6 +41,7 @@ void MoveColumns(nlohmann::json& json, std::vector<nlohmann::json::binary_t>& co
 }  // namespace
 
 std::string PageDocument::Policy() const {
+  // A page runs its own scripts alone, by their hashes, whatever is in the log that it shows.
   return "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; connect-src " + connect +
          "; style-src" + Hashes(styles) + "; script-src" + Hashes(scripts);
 }

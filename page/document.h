@@ -3,7 +3,6 @@ Its columns of numbers and texts are base64 of zlib's format, which a browser un
 DecompressionStream. */
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>

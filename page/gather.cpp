@@ -5,11 +5,8 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <memory>
 #include <numeric>
 #include <optional>
-#include <ranges>
-#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -46,8 +43,8 @@ std::string Quoted(const std::string& text) {
 std::string ReplayCommandOf(const Logs& logs, const std::string& config, const LogKey& key) {
   std::string command = "forereach replay";
   for (const std::string& log : logs) command += " " + Quoted(log);
-  if (!config.empty()) command += " --config " + Quoted(config);
-  if (!key.file.empty()) command += " --key " + Quoted(key.file);
+  if (!config.empty()) command += fmt::format(" --config {}", Quoted(config));
+  if (!key.file.empty()) command += fmt::format(" --key {}", Quoted(key.file));
   return command + (key.none ? " --no-key" : "");
 }
 
@@ -169,7 +166,7 @@ class DetailMaker final : CaseJudge {
   }
 
   void Refuse(const JudgedCandidate& judged, const std::string& why) override {
-    run_.details[judged.place].missing = "it cannot be judged again: " + why;
+    run_.details[judged.place].missing = fmt::format("it cannot be judged again: {}", why);
   }
   void Look(const JudgedCandidate& judged, const Certifier& certifier, const Decision& again,
             const Tube& tube) override {
@@ -210,7 +207,7 @@ void ReadLogs(const Logs& logs, LogTasks tasks, bool makes_rows, const PageBound
   run.damage += timeline.damage();
   run.shadow = ToSentence(shadow.Finish());
   if (const std::string passed_over = DescribePassedOver(timeline.passed_over()); !passed_over.empty())
-    run.notes.push_back("Messages were passed over" + passed_over + ".");
+    run.notes.push_back(fmt::format("Messages were passed over{}.", passed_over));
   AddTasks(tasks, run);
   pass.tasks = tasks.found();
 }
@@ -275,6 +272,7 @@ void LastCases::OnDecision(const RecordedDecision& recorded) {
   obstacles_.Add(*recorded.basis.obstacles);
   Entry& entry = entries_[next_++];
   entry.recorded = CaseOf(recorded);
+  // A later plan of the same number is the one that states name.
   if (is_certified && entry.recorded.missing.empty()) executing_[entry.recorded.candidate->plan_id] = next_ - 1;
 }
 
@@ -304,7 +302,7 @@ void ReadPass(const RunLogs& run, const PageTasks& tasks, const PageBounds& boun
     if (!run.logs.empty()) ReadLogs(run.logs, tasks.of_run.Of(run.logs), !has_database, bounds, pass);
   } catch (const BadInput& error) {
     if (!has_database) throw;
-    page.notes.push_back(std::string("No tubes, faults and withdrawals: ") + error.what());
+    page.notes.push_back(fmt::format("No tubes, faults and withdrawals: {}", error.what()));
   }
   const auto shadows = std::ranges::count(page.decisions, "shadow", &PageDecision::cause);
   if (page.shadow.empty() && shadows > 0)
@@ -427,7 +425,7 @@ void AddDetails(PageRun& page, PageRun&& details, std::size_t& bytes) {
 }
 
 void AddMissing(PageRun& page, const NamedRuns& named) {
-  for (const std::string& missing : named.missing) page.notes.push_back("Not read: " + missing + ".");
+  for (const std::string& missing : named.missing) page.notes.push_back(fmt::format("Not read: {}.", missing));
 }
 
 PageRun EmptyPage(const std::vector<std::string>& inputs) {

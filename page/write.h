@@ -1,7 +1,6 @@
 /** The page as HTML. */
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "page/page_data.h"

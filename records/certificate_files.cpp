@@ -11,7 +11,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "bus/bus_options.h"
@@ -220,8 +219,9 @@ class CertificateReader final : public TimelineUser {
 
   BesideCertificates Finish(const Timeline& timeline, const std::string& log) {
     for (const auto& [digest, grounds] : in_log_)
-      user_.OnCertificate(Missing("plan with digest " + digest, "certified in the log, but not in the database"),
-                          nullptr);
+      user_.OnCertificate(
+          Missing(fmt::format("plan with digest {}", digest), "certified in the log, but not in the database"),
+          nullptr);
     if (const std::int64_t places = timeline.damage().places; places > 0)
       user_.OnCertificate(Missing(log, fmt::format("the log is damaged in {} places", places)), nullptr);
     beside_.passed_over = timeline.passed_over();
@@ -271,9 +271,9 @@ class CertificateReader final : public TimelineUser {
     if (first->second.certified.empty())
       ++beside_.not_certificates;
     else if (!first->second.has_plan)
-      user_.OnCertificate(
-          Missing("plan with digest " + ToHex(first->first), "decided as certified, but the log has no certified plan"),
-          nullptr);
+      user_.OnCertificate(Missing(fmt::format("plan with digest {}", ToHex(first->first)),
+                                  "decided as certified, but the log has no certified plan"),
+                          nullptr);
     decided_.erase(first);
     order_.pop_front();
   }
@@ -291,7 +291,7 @@ class CertificateReader final : public TimelineUser {
   static void CheckDecision(const decision_t& decision, Open& open) {
     RecordedCertificate& certificate = open.recorded;
     const auto compare = [&](const std::string& field, const std::string& expected, const std::string& found) {
-      certificate.Compare(kAltered + ("its decision's " + field), expected, found);
+      certificate.Compare(fmt::format("{}its decision's {}", kAltered, field), expected, found);
     };
     const candidate_plan_t& plan = open.candidate;
     const Grounds found = GroundsOf(decision);
@@ -321,7 +321,7 @@ class CertificateReader final : public TimelineUser {
       CompareThreshold(decision, problem, static_cast<int>(plan.num_steps), certificate);
       clearance = SubDown(decision.margin, decision.threshold);
       if (!(clearance > 0 && clearance < kInfinity))
-        compare("margin", "above " + ToText(decision.threshold), ToText(decision.margin));
+        compare("margin", fmt::format("above {}", ToText(decision.threshold)), ToText(decision.margin));
     } else {
       compare("margin", ToText(kInfinity), ToText(decision.margin));
       compare("threshold", "0", ToText(decision.threshold));
@@ -342,7 +342,7 @@ class CertificateReader final : public TimelineUser {
         if (threshold == decision.threshold) return;
         least = std::min(least, threshold);
       }
-    certificate.Compare(kAltered + std::string("its decision's threshold"), ToText(least), ToText(decision.threshold));
+    certificate.Compare(fmt::format("{}its decision's threshold", kAltered), ToText(least), ToText(decision.threshold));
   }
 
   // Only the message of a log says which step and which part is the closest.
@@ -361,8 +361,9 @@ class CertificateReader final : public TimelineUser {
     for (int t = 0; t <= steps; ++t)
       for (int part = -1; part < static_cast<int>(problem.body.parts.size()); ++part)
         if (is(sentence(t, part))) return;
-    certificate.Compare(kAltered + std::string("its decision's message"),
-                        sentence(0, -1) + how + (decision.obstacle < 0 ? "" : ", or another step"), found);
+    certificate.Compare(fmt::format("{}its decision's message", kAltered),
+                        fmt::format("{}{}{}", sentence(0, -1), how, decision.obstacle < 0 ? "" : ", or another step"),
+                        found);
   }
 
   const bool has_rows_;
@@ -410,9 +411,9 @@ BesideCertificates ReadCertificates(const std::string& path, const std::string& 
     return ReadRun({.robot = "", .logs = {path}, .database = "", .missing = {}}, RunTasks(config_path, key, false),
                    false, user);
   } catch (const nlohmann::json::exception& error) {
-    throw ConfigError(path + ": not a decision of `forereach certify --json`: it " + DescribeJsonError(error));
+    throw ConfigError("{}: not a decision of `forereach certify --json`: it {}", path, DescribeJsonError(error));
   } catch (const std::invalid_argument& error) {
-    throw ConfigError(path + ": " + error.what());
+    throw ConfigError("{}: {}", path, error.what());
   }
 }
 

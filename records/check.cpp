@@ -185,9 +185,9 @@ class DirectoryCheck {
   [[nodiscard]] BusOptions ChannelsOf(const RunRow& run, const LogCheck& check) const {
     if (!run.robot.empty() && key_.file.empty() && !key_.none)
       throw ConfigError(
-          fmt::format("{}: its logger had the keys of {}: name them with --key FILE (verify.pub is "
-                      "enough), or believe every message with --no-key",
-                      directory_.PathOf(run.log_file), run.robot));
+          "{}: its logger had the keys of {}: name them with --key FILE (verify.pub is "
+          "enough), or believe every message with --no-key",
+          directory_.PathOf(run.log_file), run.robot);
     const LogKey key = run.robot.empty() ? LogKey{.file = "", .none = true} : key_;
     if (check.damaged_tasks.empty()) return forereach::ChannelsOf({directory_.PathOf(run.log_file)}, config_, key);
     Config task = config_.empty() ? Config() : LoadConfig(config_, TransitionsFile::kIgnore);
@@ -256,11 +256,11 @@ std::vector<LogCheck> CheckLogs(const std::string& path, const std::string& conf
   const std::string file = (std::filesystem::path(path) / LogDirectory::kDatabase).string();
   std::error_code error;
   if (std::filesystem::is_regular_file(path, error))
-    throw LogError(path + ": is a file; name the logger's directory, in which it lies");
-  if (!std::filesystem::is_directory(path, error)) throw LogError(path + ": there is no such directory");
+    throw LogError(fmt::format("{}: is a file; name the logger's directory, in which it lies", path));
+  if (!std::filesystem::is_directory(path, error)) throw LogError(fmt::format("{}: there is no such directory", path));
   if (!std::filesystem::is_regular_file(file, error))
-    throw LogError(path + ": is no logger's directory: no decision database: " + file);
-  if (KindOf(file) != FileKind::kDatabase) throw LogError(file + ": is no decision database");
+    throw LogError(fmt::format("{}: is no logger's directory: no decision database: {}", path, file));
+  if (KindOf(file) != FileKind::kDatabase) throw LogError(fmt::format("{}: is no decision database", file));
   return DirectoryCheck(path, file, config, key).CheckAll();
 }
 

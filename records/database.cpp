@@ -8,7 +8,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-
 #include <sqlite3.h>
 #include <nlohmann/json.hpp>
 
@@ -139,7 +138,7 @@ class Database::Statement final {
     try {
       for (const auto& entry : ParseJson(text)) value.push_back(entry.is_null() ? kNoNumber : entry.get<double>());
     } catch (const nlohmann::json::exception&) {
-      throw DatabaseError("a state in it is no list of numbers: " + text);
+      throw DatabaseError(fmt::format("a state in it is no list of numbers: {}", text));
     }
   }
   void ReadNext(std::optional<std::int64_t>& value) {
@@ -181,7 +180,7 @@ Database::Database(const std::string& path) : path_(path), handle_(nullptr, &sql
     set_events_ = std::make_unique<Statement>(handle, "UPDATE runs SET events = ? WHERE log_file = ?");
     static_cast<void>(FindDisplaced());
   } catch (const DatabaseError& error) {
-    throw DatabaseError("database: " + path + ": " + error.what());
+    throw DatabaseError(fmt::format("database: {}: {}", path, error.what()));
   }
 }
 
@@ -221,7 +220,7 @@ std::optional<std::string> Database::FindDisplaced() {
     if (known == files_.end()) {
       if (found) files_.emplace(ending, *found);  // those of the write-ahead log come with the first transaction
     } else if (found != known->second) {
-      return path_ + ending + (found ? " was replaced" : " was deleted or moved");
+      return fmt::format("{}{}{}", path_, ending, found ? " was replaced" : " was deleted or moved");
     }
   }
   return std::nullopt;
@@ -243,7 +242,7 @@ std::optional<int> Database::Write(const Rows& rows, const std::string& log_file
     Execute("COMMIT");
     return written;
   } catch (const DatabaseError& error) {
-    problem_ = "database: " + path_ + ": " + error.what();
+    problem_ = fmt::format("database: {}: {}", path_, error.what());
     if (sqlite3_get_autocommit(handle_.get()) == 0) sqlite3_exec(handle_.get(), "ROLLBACK", nullptr, nullptr, nullptr);
     return std::nullopt;
   }
@@ -293,7 +292,8 @@ std::vector<RunRow> Database::Runs() {
   for (const RunRow& run : runs)
     for (const std::string& file : {run.log_file, run.continues})
       if (file.find_first_of(std::string_view("/\0", 2)) != std::string::npos || file == "." || file == "..")
-        throw DatabaseError("database: " + path_ + ": a run names a log that is not in its directory: " + file);
+        throw DatabaseError(
+            fmt::format("database: {}: a run names a log that is not in its directory: {}", path_, file));
   return runs;
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 #include <sstream>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "forereach/certify/explain.h"
@@ -66,7 +67,7 @@ class Reading {
     set.upper = inputs["initial_set"]["upper"].Numbers(n);
     if (set.lower != config_.initial_set.lower() || set.upper != config_.initial_set.upper())
       record_.mismatches.push_back(
-          {kOtherInput + std::string("inputs.initial_set"), "that of " + config_.path, "another"});
+          {kOtherInput + std::string("inputs.initial_set"), fmt::format("that of {}", config_.path), "another"});
     record_.certificate.obstacles = config_.obstacles;
     record_.certificate.stay_in = StayInOf(config_);
     const Schedule& schedule = record_.certificate.schedule =
@@ -125,7 +126,8 @@ class Reading {
     std::set<std::string> keys;
     for (const auto& [what, name, digest] : expected) {
       keys.insert(name);
-      record_.Compare(what + "digest of " + (what == kOtherInput ? "the " : "") + name, digest, digests[name].Text());
+      record_.Compare(fmt::format("{}digest of {}{}", what, what == kOtherInput ? "the " : "", name), digest,
+                      digests[name].Text());
     }
     digests.RequireFields(keys);
   }
@@ -176,8 +178,8 @@ class Reading {
       if (!is_kept_by_one) Compare(threshold, by_part);
       const double claimed = SubDown(margin.Number(), threshold.Number());
       if (claimed != clearance)
-        record_.Compare(kAltered + margin.name() + " less the distance to be kept", JsonText(nlohmann::json(clearance)),
-                        JsonText(nlohmann::json(claimed)));
+        record_.Compare(fmt::format("{}{} less the distance to be kept", kAltered, margin.name()),
+                        JsonText(nlohmann::json(clearance)), JsonText(nlohmann::json(claimed)));
     }
     const std::string sentence =
         ExplainCertificate(*config_.problem, {step, obstacle, part, clearance}, config_.obstacles);
@@ -227,8 +229,7 @@ bool IsCertificate(const std::string& path, const nlohmann::json& document) {
   for (const std::int16_t abstention :
        {decision_t::ABSTAIN_FALSIFIED, decision_t::ABSTAIN_DOMAIN, decision_t::ABSTAIN_SAFETY})
     if (name == OutcomeName(abstention)) return false;
-  if (name != OutcomeName(decision_t::CERTIFIED))
-    outcome.Fail(std::string("'").append(name, 0, 40) + "' is no outcome");
+  if (name != OutcomeName(decision_t::CERTIFIED)) outcome.Fail(fmt::format("'{}' is no outcome", name.substr(0, 40)));
   return true;
 }
 

@@ -25,7 +25,7 @@ constexpr std::int64_t kHeaderBytes = 28;
 constexpr std::int64_t kMaxNumber = std::int64_t{1} << 62;
 
 std::string Reason(const std::string& what, const std::string& path) {
-  return what + path + ": " + std::strerror(errno);
+  return fmt::format("{}{}: {}", what, path, std::strerror(errno));
 }
 
 }  // namespace
@@ -58,7 +58,7 @@ EventLogReader::EventLogReader(const std::string& path)
     : file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)), window_(kWindowBytes) {
   struct stat status {};
   if (file_.get() < 0 || ::fstat(file_.get(), &status) != 0) throw LogError(Reason("log: cannot read ", path));
-  if (!S_ISREG(status.st_mode)) throw LogError("log: cannot read " + path + ": not a regular file");
+  if (!S_ISREG(status.st_mode)) throw LogError(fmt::format("log: cannot read {}: not a regular file", path));
   size_ = status.st_size;
 }
 
@@ -208,7 +208,7 @@ EventLogWriter::EventLogWriter(const std::string& path)
     : path_(path), file_(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
   if (file_.get() < 0) throw LogError(Reason("log: cannot write ", path));
   if (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0)
-    throw LogError("log: " + path + " is being written by another process");
+    throw LogError(fmt::format("log: {} is being written by another process", path));
   if (!ConfirmDirectory(std::filesystem::path(path).parent_path().string()))
     throw LogError(Reason("log: cannot write ", path));
   Recover(path);
@@ -276,12 +276,12 @@ bool EventLogWriter::Flush() {
     mark_at_ = std::exchange(offset_, end);
     is_torn_ = false;
   } else if (is_cut) {
-    problem_ = "log: " + path_ + " was cut short while it was written";
+    problem_ = fmt::format("log: {} was cut short while it was written", path_);
   } else {
-    problem_ = std::string("log: cannot write: ") + std::strerror(errno);
+    problem_ = fmt::format("log: cannot write: {}", std::strerror(errno));
     // A torn record in the middle of the file would read as damage.
     is_torn_ = ::ftruncate(file_.get(), offset_) != 0;
-    if (is_torn_) problem_ += std::string("; cannot put the file back: ") + std::strerror(errno);
+    if (is_torn_) problem_ += fmt::format("; cannot put the file back: {}", std::strerror(errno));
   }
   buffer_.clear();
   return confirmed && !is_cut;

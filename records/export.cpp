@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "lcmtypes/printable.h"
 #include "records/database.h"
 #include "records/export_table.h"
@@ -273,7 +275,7 @@ class McapSink final : public Sink {
     if (schema == schemas_.end())
       schema = schemas_.emplace(type, file_->AddSchema("forereach." + type, SchemaOf(type))).first;
     std::string topic = prefix_ + Printable(name);
-    if (!topics_.insert(topic).second) topics_.insert(topic += " (" + type + ")");
+    if (!topics_.insert(topic).second) topics_.insert(topic += fmt::format(" ({})", type));
     return channels_
         .emplace(std::pair(name, type), file_->AddChannel(schema->second, topic, {{"robot", Printable(robot)}}))
         .first->second;
@@ -368,7 +370,7 @@ ShardPieces::ShardPieces(const std::string& path) : path_(path), in_(path) {
   std::getline(in_, header);
 }
 
-void ShardPieces::Refuse() const { throw OutputError(path_ + ": has no pieces of an export"); }
+void ShardPieces::Refuse() const { throw OutputError(fmt::format("{}: has no pieces of an export", path_)); }
 
 // The next piece, unless it is there: an array of at most 23 whole numbers, texts and byte strings, each in one part.
 // All else may nest, and nlohmann's reader recurses.

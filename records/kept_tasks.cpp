@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <unistd.h>
 
 #include "bus/descriptor.h"
@@ -30,7 +31,7 @@ bool IsDigest(std::string_view text) {
 std::string BytesOf(const std::string& path) { return ReadWhole(path, kLargestFile); }
 
 [[noreturn]] void FailToWrite(const std::string& path) {
-  throw ConfigError(path + ": cannot be written: " + std::strerror(errno));
+  throw ConfigError("{}: cannot be written: {}", path, std::strerror(errno));
 }
 
 void Confirm(const std::string& directory) {
@@ -91,8 +92,8 @@ TaskCopy CopyTask(const Config& config) {
   const NamedFiles named = FilesNamedBy(config.path);
   if (!named.model.empty()) copy.model_file = BytesOf(named.model);
   if (TaskDigest(copy.task, copy.model_file) != config.grounds.config)
-    throw ConfigError(config.path + ": has changed since it was read" +
-                      (named.model.empty() ? "" : ", or " + named.model + " has"));
+    throw ConfigError("{}: has changed since it was read{}", config.path,
+                      named.model.empty() ? "" : fmt::format(", or {} has", named.model));
   copy.transitions = BytesOf(named.transitions);
   if (!named.policy.empty()) copy.policy = BytesOf(named.policy);
   return copy;
@@ -111,7 +112,7 @@ void KeptTasks::Keep(const TaskCopy& copy) const {
   if (fs::exists(task) && fs::exists(transitions) && (policy.empty() || fs::exists(policy))) return;
   std::error_code error;
   fs::create_directories(directory, error);
-  if (error) throw ConfigError(directory + ": cannot be made: " + error.message());
+  if (error) throw ConfigError("{}: cannot be made: {}", directory, error.message());
   const Part data(transitions, copy.transitions);
   if (ObservationsDigest(*copy.model, LoadTransitions(data.path(), *copy.model)) != copy.observations_digest)
     throw ConfigError("the transitions of the task have changed since they were read");
@@ -134,16 +135,16 @@ std::optional<Config> KeptTasks::Find(const Digest& digest,
   std::error_code no_path;
   if (!fs::exists(task, no_path)) return std::nullopt;
   std::vector<std::string> versions = DigestsOfNames(directory, kTransitions, kTransitionsEnding);
-  if (versions.empty()) throw ConfigError(task + ": its transitions are not kept next to it");
+  if (versions.empty()) throw ConfigError("{}: its transitions are not kept next to it", task);
   if (versions.size() > 1)
     std::erase_if(versions, [seen = observations()](const std::string& version) {
       return std::ranges::none_of(seen, [&](const Digest& named) { return ToHex(named) == version; });
     });
   if (versions.size() != 1)
-    throw ConfigError(task + ": of the versions of its transitions beside it the log names " +
-                      (versions.empty() ? "none" : "several") +
-                      "; copy the right one to where the task file has it, and "
-                      "name the task with --config");
+    throw ConfigError(
+        "{}: of the versions of its transitions beside it the log names {}; copy the right one to where "
+        "the task file has it, and name the task with --config",
+        task, versions.empty() ? "none" : "several");
   return Load(ToHex(digest), versions.front());
 }
 
@@ -155,14 +156,14 @@ Config KeptTasks::Load(const std::string& digest, const std::string& version) co
   for (const std::string& policy : DigestsOfNames(directory, kPolicy, "")) {
     instead.policy = PolicyFileOf(directory, policy);
     if (ToHex(DigestOf(BytesOf(instead.policy))) != policy)
-      throw ConfigError(instead.policy + ": is damaged: its digest is not its name's");
+      throw ConfigError("{}: is damaged: its digest is not its name's", instead.policy);
   }
   Config config = LoadConfig(task, instead);
   if (ToHex(config.grounds.config) != digest)
-    throw ConfigError(task + ": is damaged: its digest is " + ToHex(config.grounds.config) + ", not its directory's");
+    throw ConfigError("{}: is damaged: its digest is {}, not its directory's", task, ToHex(config.grounds.config));
   if (ToHex(config.grounds.observations) != version)
-    throw ConfigError(transitions + ": is damaged: its digest is " + ToHex(config.grounds.observations) +
-                      ", not its name's");
+    throw ConfigError("{}: is damaged: its digest is {}, not its name's", transitions,
+                      ToHex(config.grounds.observations));
   return config;
 }
 
@@ -171,7 +172,7 @@ std::vector<std::string> KeptTasks::FindDamage(const std::string& digest) const 
   std::error_code no_path;
   if (!IsDigest(digest) || !fs::exists(task, no_path)) return {};
   const std::vector<std::string> versions = DigestsOfNames(directory, kTransitions, kTransitionsEnding);
-  if (versions.empty()) return {task + ": its transitions are not kept next to it"};
+  if (versions.empty()) return {fmt::format("{}: its transitions are not kept next to it", task)};
   std::vector<std::string> damage;
   for (const std::string& version : versions) try {
       static_cast<void>(Load(digest, version));

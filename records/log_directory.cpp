@@ -26,7 +26,7 @@ LogDirectory::LogDirectory(std::string path) : path_(std::move(path)) { Make(); 
 void LogDirectory::Make() const {
   std::error_code error;
   std::filesystem::create_directories(path_, error);
-  if (error) throw LogError("logger: cannot make the directory " + path_ + ": " + error.message());
+  if (error) throw LogError(fmt::format("logger: cannot make the directory {}: {}", path_, error.message()));
 }
 
 std::string LogDirectory::PathOf(const std::string& file) const {

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "lcmtypes/printable.h"
 #include "records/event_log.h"
 #include "records/log_survey.h"
@@ -88,8 +90,8 @@ void RequireChannels(const LogSelection& selection, const std::set<std::string>&
     if (seen.contains(channel) || seen.size() == LogEditResult::kMostChannels) continue;
     std::string names;
     for (const std::string& name : seen) names += (names.empty() ? "" : ", ") + Printable(name);
-    throw LogError(Printable(channel) + ": no event has this channel; " +
-                   (names.empty() ? "there are no events" : "the channels are " + names));
+    throw LogError(fmt::format("{}: no event has this channel; {}", Printable(channel),
+                               names.empty() ? "there are no events" : fmt::format("the channels are {}", names)));
   }
 }
 
@@ -205,9 +207,10 @@ std::int64_t ParseLogTime(const std::string& text, std::int64_t first_utime) {
   } else if (const auto seconds = SecondsOfDate(text); seconds && *seconds >= 0) {
     return std::llround(*seconds * 1e6L);
   }
-  throw LogError(text +
-                 ": is no time; write microseconds since the Unix epoch, a time in UTC as 2026-01-01T12:00:00, or "
-                 "+SECONDS after the first event");
+  throw LogError(
+      fmt::format("{}: is no time; write microseconds since the Unix epoch, a time in UTC as 2026-01-01T12:00:00, or "
+                  "+SECONDS after the first event",
+                  text));
 }
 
 LogEditResult ReadLogs(const std::vector<std::string>& logs, const LogSelection& selection, LogSequence sequence,

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "lcmtypes/names.h"
@@ -20,17 +22,20 @@ namespace fs = std::filesystem;
 [[noreturn]] void RefuseAsLog(const std::string& path, FileKind kind) {
   switch (kind) {
     case FileKind::kDirectory:
-      throw LogError(path + ": is a directory; name the event logs in it, events-*.lcmlog of one run");
+      throw LogError(fmt::format("{}: is a directory; name the event logs in it, events-*.lcmlog of one run", path));
     case FileKind::kDatabase:
       throw LogError(
-          path +
-          ": is an SQLite database, not an LCM event log; name the event logs in its directory, events-*.lcmlog of "
-          "one run");
+          fmt::format("{}: is an SQLite database, not an LCM event log; name the event logs in its directory, "
+                      "events-*.lcmlog of one run",
+                      path));
     case FileKind::kJson:
-      throw LogError(path +
-                     ": is a JSON document, not an LCM event log; a decision of `forereach certify --json` is for "
-                     "`forereach verify` alone");
-    default: throw LogError(path + ": is no LCM event log: no event is in it; the logger's are named events-*.lcmlog");
+      throw LogError(
+          fmt::format("{}: is a JSON document, not an LCM event log; a decision of `forereach certify --json` is for "
+                      "`forereach verify` alone",
+                      path));
+    default:
+      throw LogError(
+          fmt::format("{}: is no LCM event log: no event is in it; the logger's are named events-*.lcmlog", path));
   }
 }
 
@@ -111,7 +116,7 @@ FileKind KindOf(const std::string& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) return FileKind::kDirectory;
   if (fs::exists(path, error) && !fs::is_regular_file(path, error))
-    throw LogError("log: cannot read " + path + ": not a regular file");
+    throw LogError(fmt::format("log: cannot read {}: not a regular file", path));
   const std::string bytes = ReadBeginning(path, 16);
   if (bytes.empty()) return FileKind::kEmpty;
   if (bytes == std::string_view("SQLite format 3\0", 16)) return FileKind::kDatabase;
@@ -125,7 +130,7 @@ void RequireLogs(const std::vector<std::string>& logs) {
   std::set<std::string> named;
   for (const std::string& log : logs) {
     if (std::error_code error; !named.insert(fs::weakly_canonical(log, error).string()).second)
-      throw LogError(log + ": is named twice");
+      throw LogError(fmt::format("{}: is named twice", log));
     RequireLog(log);
   }
 }

@@ -64,19 +64,19 @@ void LogTasks::Look(bool must_be_given) {
     }
   }
   if (must_be_given && !order_.empty())
-    throw ConfigError(given_->path + ": is not the task that " + logs_.front() +
-                      " was recorded with: its config digest is " + ToHex(given_->grounds.config) + ", the log has " +
-                      Describe() + "; a task that is kept is found without --config");
+    throw ConfigError(
+        "{}: is not the task that {} was recorded with: its config digest is {}, the log has {}; a task "
+        "that is kept is found without --config",
+        given_->path, logs_.front(), ToHex(given_->grounds.config), Describe());
 }
 
 const Config& LogTasks::first() const {
   if (!found_.empty()) return *found_.front();
   if (order_.empty())
-    throw ConfigError(logs_.front() +
-                      ": nothing in it was decided, so nothing names its task: name it with --config FILE");
-  throw ConfigError(logs_.front() +
-                    ": its task is not kept next to it; name it with --config FILE: its config digest is " +
-                    Describe());
+    throw ConfigError("{}: nothing in it was decided, so nothing names its task: name it with --config FILE",
+                      logs_.front());
+  throw ConfigError("{}: its task is not kept next to it; name it with --config FILE: its config digest is {}",
+                    logs_.front(), Describe());
 }
 
 const Config* LogTasks::Find(const Digest& config) {
@@ -109,9 +109,9 @@ std::string LogTasks::Describe() const {
   std::string text;
   for (std::size_t i = 0; i < std::min(order_.size(), kMaxNamed); ++i) {
     const std::string place = kept_.PathOf(order_[i]);
-    text += fmt::format("{}{} ({} decisions and certified plans{})", i > 0 ? "; " : "", ToHex(order_[i]),
-                        decisions_.at(order_[i]),
-                        std::filesystem::exists(place) ? ", kept in " + place : ", not kept next to the log");
+    text += fmt::format(
+        "{}{} ({} decisions and certified plans{})", i > 0 ? "; " : "", ToHex(order_[i]), decisions_.at(order_[i]),
+        std::filesystem::exists(place) ? fmt::format(", kept in {}", place) : ", not kept next to the log");
   }
   return text + (order_.size() > kMaxNamed ? "; and others" : "");
 }
@@ -119,10 +119,10 @@ std::string LogTasks::Describe() const {
 void LogTasks::RequirePlans() const {
   if (has_plans()) return;
   throw LogError(
-      logs_.front() + (logs_.size() > 1 ? " and those behind it: " : ": ") +
-      (events_ == 0 ? "is empty" : fmt::format("holds {} events", events_)) +
-      ", and neither a candidate nor a decision; nothing was proposed while it was recorded, or it is not of "
-      "ForeReach");
+      fmt::format("{}{}{}, and neither a candidate nor a decision; nothing was proposed while it was recorded, or it "
+                  "is not of ForeReach",
+                  logs_.front(), logs_.size() > 1 ? " and those behind it: " : ": ",
+                  events_ == 0 ? "is empty" : fmt::format("holds {} events", events_)));
 }
 
 RunTasks::RunTasks(const std::string& given, LogKey key, bool is_many) : key_(std::move(key)), is_many_(is_many) {

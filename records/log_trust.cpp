@@ -1,7 +1,6 @@
 #include "records/log_trust.h"
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 namespace forereach {
@@ -12,16 +11,17 @@ void LogKey::Override(BusOptions& options) const {
 
 void LogKey::Override(Config& task, const std::string& given) const {
   if (!task.bus.key.empty() && task.path != given && file.empty() && !none)
-    throw ConfigError(task.path +
-                      ": the task has a key, bus.key, and keys are not kept: name it with --key FILE, or believe "
-                      "every message with --no-key");
+    throw ConfigError(
+        "{}: the task has a key, bus.key, and keys are not kept: name it with --key FILE, or believe every "
+        "message with --no-key",
+        task.path);
   Override(task.bus);
 }
 
 std::string DescribePassedOver(const PassedOver& passed_over) {
   const std::string refused = DescribeRefusals(passed_over.not_authentic);
   std::string text;
-  if (!refused.empty()) text += "; not authentic and passed over: " + refused;
+  if (!refused.empty()) text += fmt::format("; not authentic and passed over: {}", refused);
   if (passed_over.undecodable > 0)
     text += fmt::format("; no certified plan and passed over: {}", passed_over.undecodable);
   return text;

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "lcmtypes/candidate_batch.h"
@@ -224,7 +225,7 @@ std::string SchemaOf(std::string_view type) {
                         json["title"] = Message::getTypeName();
                         schema = JsonText(json);
                       }))
-    throw std::invalid_argument("no type of message: " + std::string(type));
+    throw std::invalid_argument(fmt::format("no type of message: {}", type));
   return schema;
 }
 

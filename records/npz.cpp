@@ -69,7 +69,7 @@ class Zip final {
 
  private:
   void Require(bool done) const {
-    if (!done) throw OutputError(path_ + ": cannot be written: " + std::strerror(errno));
+    if (!done) throw OutputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
   }
 
   const std::string path_;
@@ -123,7 +123,7 @@ void NpzWriter::Finish() {
     std::rewind(array.spool.stream());
     for (std::int64_t i = 0; i < array.rows; ++i) {
       if (std::fread(row.data(), 1, row.size(), array.spool.stream()) != row.size())
-        throw OutputError(file_.path() + ": what was kept beside it cannot be read back");
+        throw OutputError(fmt::format("{}: what was kept beside it cannot be read back", file_.path()));
       if (bytes > 0) zip.Write(std::string_view(row).substr(0, bytes));
     }
     zip.End();

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -45,7 +46,7 @@ OutputFile::OutputFile(std::string path, Existing existing) : path_(std::move(pa
   std::error_code error;
   if (existing_ == Existing::kKept && Exists(path_)) FailExists();
   if (Exists(path_) && !std::filesystem::is_regular_file(path_, error))
-    throw OutputError(path_ + ": is no file that can be replaced; choose another name");
+    throw OutputError(fmt::format("{}: is no file that can be replaced; choose another name", path_));
   const int descriptor = OpenPart(path_, part_);
   if (descriptor < 0) Fail();
   stream_ = ::fdopen(descriptor, "w+b");
@@ -58,12 +59,12 @@ OutputFile::OutputFile(std::string path, Existing existing) : path_(std::move(pa
 OutputFile OutputFile::Nameless(const std::string& beside) {
   std::string part;
   const int descriptor = OpenPart(beside, part);
-  if (descriptor < 0) throw OutputError(part + ": " + std::strerror(errno));
+  if (descriptor < 0) throw OutputError(fmt::format("{}: {}", part, std::strerror(errno)));
   ::unlink(part.c_str());
   std::FILE* const stream = ::fdopen(descriptor, "w+b");
   if (!stream) {
     ::close(descriptor);
-    throw OutputError(part + ": " + std::strerror(errno));
+    throw OutputError(fmt::format("{}: {}", part, std::strerror(errno)));
   }
   return {beside, stream};
 }
@@ -117,9 +118,11 @@ void OutputFile::Name() const {
   if (::rename(part_.c_str(), path_.c_str()) != 0) Fail();
 }
 
-void OutputFile::Fail() const { throw OutputError(path_ + ": cannot be written: " + std::strerror(errno)); }
+void OutputFile::Fail() const {
+  throw OutputError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
+}
 void OutputFile::FailExists() const {
-  throw OutputError(path_ + ": the file exists, and is not changed; choose another name");
+  throw OutputError(fmt::format("{}: the file exists, and is not changed; choose another name", path_));
 }
 
 void GiveName(const std::string& file, const std::string& path) {
@@ -131,7 +134,8 @@ void GiveName(const std::string& file, const std::string& path) {
 
 void RequireNewFile(const std::string& path, bool force) {
   if (!force && Exists(path))
-    throw OutputError(path + ": the file exists, and is not changed; choose another name, or write --force");
+    throw OutputError(
+        fmt::format("{}: the file exists, and is not changed; choose another name, or write --force", path));
 }
 
 void WriteNewFile(const std::string& path, const std::string& text, bool force) {

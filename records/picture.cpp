@@ -161,7 +161,7 @@ class Painter final {
   }
 
   void PaintObstacles() {
-    svg_.Open("opacity=\"0.88\" " + Fill(kObstacle, 1, 0.8));
+    svg_.Open(fmt::format("opacity=\"0.88\" {}", Fill(kObstacle, 1, 0.8)));
     for (const Obstacle& obstacle : picture_.obstacles)
       DrawObstacle(obstacle, {obstacle.motion() ? static_cast<double>(obstacle.motion()->stamp_us) : 0}, frame_, "",
                    svg_);
@@ -236,7 +236,7 @@ std::string PngOf(const std::string& svg) {
     if (done) return;
     const std::string why = error ? error->message : "there is not enough memory";
     g_clear_error(&error);
-    throw PictureError("picture: a .png cannot be drawn: " + why);
+    throw PictureError(fmt::format("picture: a .png cannot be drawn: {}", why));
   };
   const std::unique_ptr<RsvgHandle, decltype(&g_object_unref)> handle(
       rsvg_handle_new_from_data(reinterpret_cast<const guint8*>(svg.data()), svg.size(), &error), &g_object_unref);
@@ -255,25 +255,26 @@ std::string PngOf(const std::string& svg) {
 
 std::vector<std::string> PictureFiles(const std::string& name) {
   const std::filesystem::path path(name);
-  if (!path.has_filename()) throw PictureError("picture: '" + name + "' names no file");
+  if (!path.has_filename()) throw PictureError(fmt::format("picture: '{}' names no file", name));
   const std::string ending = path.extension();
   if (!ending.empty() && ending != ".svg" && ending != ".png")
-    throw PictureError("picture: " + name + " ends in " + ending +
-                       "; it has to end in .svg or .png, or have no ending: then both are written");
+    throw PictureError(
+        fmt::format("picture: {} ends in {}; it has to end in .svg or .png, or have no ending: then both are written",
+                    name, ending));
   const std::filesystem::path directory = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
   std::error_code ignored;
   if (!std::filesystem::is_directory(directory, ignored))
-    throw PictureError("picture: " + name + ": there is no directory " + directory.string());
+    throw PictureError(fmt::format("picture: {}: there is no directory {}", name, directory.string()));
   const std::vector<std::string> files = ending.empty() ? std::vector{name + ".svg", name + ".png"} : std::vector{name};
   for (const std::string& file : files)
     if (std::filesystem::is_directory(file, ignored))
-      throw PictureError("picture: " + file + " is a directory, not a file");
+      throw PictureError(fmt::format("picture: {} is a directory, not a file", file));
   return files;
 }
 
 void WriteSvg(const std::string& path, int width, int height, const std::string& drawing) {
   const bool png = path.ends_with(".png");
-  if (!png && !path.ends_with(".svg")) throw PictureError("picture: " + path + " has to end in .svg or .png");
+  if (!png && !path.ends_with(".svg")) throw PictureError(fmt::format("picture: {} has to end in .svg or .png", path));
   if (width < 200 || width > 10000 || height < 200 || height > 10000)
     throw PictureError(fmt::format("picture: {} x {} pixels is not within 200 to 10000", width, height));
   const std::string svg = fmt::format(

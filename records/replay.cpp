@@ -45,14 +45,14 @@ class GateFollower : public TimelineUser {
 
 std::string DescribeDecision(const decision_t& decision) {
   std::string text(OutcomeName(decision.outcome));
-  text += ", cause " + std::string(CauseName(decision.cause));
+  text += fmt::format(", cause {}", CauseName(decision.cause));
   return fmt::format("{}, step {}", text, decision.step);
 }
 
 // Empty if they agree.
 std::string Difference(const decision_t& recorded, const decision_t& replayed) {
   if (recorded.outcome != replayed.outcome || recorded.cause != replayed.cause || recorded.step != replayed.step)
-    return "recorded " + DescribeDecision(recorded) + "; replayed " + DescribeDecision(replayed);
+    return fmt::format("recorded {}; replayed {}", DescribeDecision(recorded), DescribeDecision(replayed));
   const Grounds before = GroundsOf(recorded), after = GroundsOf(replayed);
   for (const auto& [name, digest] : kGrounds)
     if (before.*digest != after.*digest)
@@ -76,7 +76,7 @@ class Replayer final : public GateFollower {
     not_learned_.clear();
   }
   void OnRefusedTransition(const std::string& event, const std::string& why) override {
-    if (not_learned_.empty()) not_learned_ = event + ": " + why;
+    if (not_learned_.empty()) not_learned_ = fmt::format("{}: {}", event, why);
   }
 
   // Which plan a search proposes depends on the time that it had; that it is certified does not.
@@ -106,8 +106,8 @@ class Replayer final : public GateFollower {
     const auto& [bytes, event, place] = *recorded.candidate;
     if (!recorded.is_of_known_task)
       return Differ(event, decision.plan_id,
-                    "decided under another task, of config digest " + ToHex(GetDigest(decision.config_digest)) +
-                        ", which is not kept next to the log");
+                    fmt::format("decided under another task, of config digest {}, which is not kept next to the log",
+                                ToHex(GetDigest(decision.config_digest))));
     if (IsCircumstance(decision)) {
       static_cast<void>(gate().Refuse(bytes, decision.utime, decision.cause, ""));
       ++result_.counts.circumstances;
@@ -117,11 +117,12 @@ class Replayer final : public GateFollower {
     const decision_t again = DecideAgain(bytes, decision);
     std::string difference = Difference(decision, again);
     if (!difference.empty() && recorded.basis.grounds.observations != GroundsOf(decision).observations)
-      difference +=
-          not_learned_.empty()
-              ? "; transitions that had been learned are not in the log, which begins later or lacks messages"
-              : "; it rests on transitions that this release does not learn, or the log lacks some: " + not_learned_ +
-                    "; the release that recorded the log can replay it";
+      difference += not_learned_.empty()
+                        ? "; transitions that had been learned are not in the log, which begins later or lacks messages"
+                        : fmt::format(
+                              "; it rests on transitions that this release does not learn, or the log lacks some: {}; "
+                              "the release that recorded the log can replay it",
+                              not_learned_);
     Show(recorded.event, "recorded", decision);
     Show(recorded.event, "replayed", again);
     if (difference.empty())
@@ -186,12 +187,13 @@ class Replayer final : public GateFollower {
   void CheckSeal(const RecordedPlan& recorded, const Upheld& upheld) {
     const certified_plan_t& certified = recorded.certified;
     for (const SealFault& fault : FindSealFaults(certified))
-      Differ(recorded.event, certified.plan.plan_id,
-             "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
+      Differ(
+          recorded.event, certified.plan.plan_id,
+          fmt::format("the seal does not hold: {} is {}, it has to be {}", fault.field, fault.found, fault.expected));
     const Config& task = *recorded.basis.task;
     for (const UpheldDifference& difference : FindDifferences(UpheldUnder(*task.problem, task.gate), upheld))
       Differ(recorded.event, certified.plan.plan_id,
-             difference.field + " is " + difference.found + ", it is " + difference.expected + " in the task");
+             fmt::format("{} is {}, it is {} in the task", difference.field, difference.found, difference.expected));
   }
 
   // Empty if the plan's judgement is made again.
@@ -200,7 +202,7 @@ class Replayer final : public GateFollower {
     if (!recorded.is_of_known_task) return "withdrawn under another task, which is not kept next to the log";
     const Grounds named = GroundsOf(withdrawal);
     for (const auto& [name, digest] : kGrounds)
-      if (named.*digest != recorded.basis.grounds.*digest) return "withdrawn under other " + std::string(name);
+      if (named.*digest != recorded.basis.grounds.*digest) return fmt::format("withdrawn under other {}", name);
     const auto plan = std::ranges::find(plans_, GetDigest(withdrawal.certificate_digest), &Plan::certificate);
     if (plan == plans_.end()) return "withdrawn, but its certified plan is not in the log";
     const Standing standing = gate().JudgeAgain(plan->plan, plan->upheld, withdrawal.first_step);
@@ -294,7 +296,7 @@ class Comparer final : public GateFollower {
   }
   void Lose(const RecordedDecision& recorded, const decision_t& after) {
     ++cases_.counts.lost[WhyNotOf(after)];
-    cases_.Tell().lost_plans.push_back(NameOfPlan(recorded) + ": " + GetText(after.message));
+    cases_.Tell().lost_plans.push_back(fmt::format("{}: {}", NameOfPlan(recorded), GetText(after.message)));
   }
   void Refuse(const decision_t& before, const decision_t& after) {
     WhyNot then = WhyNotOf(before), now = WhyNotOf(after);

@@ -185,8 +185,8 @@ std::string TitleOf(const Config& config) {
   std::string name = config.problem->model->name();
   std::ranges::replace(name, '_', ' ');
   if (!name.empty()) name[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(name[0])));
-  return name + (config.problem->between ? ": certified at all times, and the driven path"
-                                         : ": certified at the sample instants, and the driven path");
+  return fmt::format("{}: certified at {}, and the driven path", name,
+                     config.problem->between ? "all times" : "the sample instants");
 }
 
 std::string DurationText(double microseconds) {
@@ -225,7 +225,7 @@ const RunLogs& OnlyRun(const NamedRuns& named) {
   std::vector<const RunLogs*> runs;
   for (const RunLogs& run : named.runs)
     if (!run.logs.empty()) runs.push_back(&run);
-  if (runs.empty()) throw LogError(forereach::NameOf(named.runs.front()) + ": no log of a run is there");
+  if (runs.empty()) throw LogError(fmt::format("{}: no log of a run is there", forereach::NameOf(named.runs.front())));
   if (runs.size() == 1) return *runs.front();
   throw LogError(
       fmt::format("{}: does not follow {}, and is of another run: name the files of one run, in the order of their "

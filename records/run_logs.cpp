@@ -7,6 +7,8 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "forereach/numerics/parallel.h"
 #include "records/log_directory.h"
 #include "records/log_survey.h"
@@ -48,8 +50,8 @@ class Finder final {
         named_.is_many = true;
         Claim(input, input);
         if (AddDirectory(fs::path(input), 0) == 0)
-          throw ConfigError(input +
-                            ": neither a decision database nor event logs, *.lcmlog or lcmlog-*, in this directory");
+          throw ConfigError("{}: neither a decision database nor event logs, *.lcmlog or lcmlog-*, in this directory",
+                            input);
         break;
       case FileKind::kDatabase:
         named_.is_many = true;
@@ -72,8 +74,9 @@ class Finder final {
     const auto identity = IdentityOf(path);
     if (!identity) return true;  // whoever reads it says why
     const auto [found, is_new] = inputs_.try_emplace({identity->device, identity->inode}, input);
-    if (!is_new && found->second != input) throw LogError(path + ": is named twice: " + found->second + " has it, too");
-    if (!is_new && path == input) throw LogError(path + ": is named twice");
+    if (!is_new && found->second != input)
+      throw LogError(fmt::format("{}: is named twice: {} has it, too", path, found->second));
+    if (!is_new && path == input) throw LogError(fmt::format("{}: is named twice", path));
     return is_new;
   }
 
@@ -94,7 +97,7 @@ class Finder final {
       else if (IsNamedAsLog(file->path()))
         (file->is_symlink(ignored) ? links : logs).push_back(path);
     }
-    if (error) named_.missing.push_back(directory.string() + ": " + error.message());
+    if (error) named_.missing.push_back(fmt::format("{}: {}", directory.string(), error.message()));
     const std::size_t before = named_.runs.size() + named_.missing.size();
     if (!database.empty() && Claim(database, root_)) AddDatabase(database);
     const auto is_known = [this](const std::string& log) { return !Claim(log, root_); };
@@ -128,7 +131,7 @@ class Finder final {
       RunLogs& run = named_.runs.back();
       const std::string log = (fs::path(path).parent_path() / row.log_file).string();
       if (!fs::exists(log)) {
-        named_.missing.push_back(row.log_file + ": " + WhyMissing(row));
+        named_.missing.push_back(fmt::format("{}: {}", row.log_file, WhyMissing(row)));
         run.missing.push_back(std::move(row));
       } else if (Claim(log, root_)) {
         run.logs.push_back(log);
@@ -181,9 +184,10 @@ class Finder final {
   static void RequireNoSuccessor(const Log& log, const std::vector<LogEnds>& heads) {
     for (const LogEnds& head : heads)
       if (log.is_named && Continues(log.ends, head).value_or(false) && head.utime.first >= log.ends.utime.last)
-        throw LogError(log.path +
-                       ": does not follow the logs before it, which go on from it; name the files of one run in the "
-                       "order of their names");
+        throw LogError(
+            fmt::format("{}: does not follow the logs before it, which go on from it; name the files of one run in the "
+                        "order of their names",
+                        log.path));
   }
 
   const unsigned jobs_;

@@ -2,8 +2,6 @@
 
 #include <charconv>
 
-#include <fmt/format.h>
-
 #include "lcmtypes/printable.h"
 #include "task/config_error.h"
 
@@ -17,8 +15,8 @@ Shard ShardOf(const std::string& text) {
   const bool has_count = error == std::errc() && slash != end && *slash == '/' &&
                          std::from_chars(slash + 1, end, count).ptr == end && slash + 1 != end;
   if (!has_count || number < 1 || number > count || count > kMostShards)
-    throw ConfigError(fmt::format("--shard: {} is not I/N with whole numbers 1 <= I <= N <= {}, for example 2/7",
-                                  Printable(text), kMostShards));
+    throw ConfigError("--shard: {} is not I/N with whole numbers 1 <= I <= N <= {}, for example 2/7", Printable(text),
+                      kMostShards);
   return {number - 1, count};
 }
 

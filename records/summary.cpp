@@ -106,7 +106,7 @@ std::string ToText(const Summary& summary) {
   if (summary.damage.places > 0)
     line("damage in the log", fmt::format("{} places, {} bytes skipped", summary.damage.places, summary.damage.bytes));
   if (const std::string refused = DescribeRefusals(summary.passed_over.not_authentic); !refused.empty())
-    line("not authentic", refused + ", passed over");
+    line("not authentic", fmt::format("{}, passed over", refused));
   if (summary.clock_steps > 0)
     line("clock stepped", fmt::format("{} times, first {} at event {} by {:+.3f} s; times across it are left out",
                                       summary.clock_steps, DayAndTime(summary.first_step_utime),

@@ -42,12 +42,12 @@ class ScenarioReader {
   explicit ScenarioReader(const std::string& path) : path_(path) {}
 
   [[noreturn]] void Fail(const XmlElement& at, const std::string& what) const {
-    throw ConfigError(fmt::format("{}:{}: {}: {}", path_, at.line, at.name, what));
+    throw ConfigError("{}:{}: {}: {}", path_, at.line, at.name, what);
   }
 
   [[nodiscard]] const XmlElement& Require(const XmlElement& at, std::string_view child) const {
     if (const XmlElement* found = at.Find(child)) return *found;
-    Fail(at, "has no " + std::string(child));
+    Fail(at, fmt::format("has no {}", child));
   }
 
   // An element's name. In 2018b an obstacle's is that of its role.
@@ -61,7 +61,7 @@ class ScenarioReader {
 
   [[nodiscard]] double Checked(const XmlElement& at, const std::string& text, double lower, double upper) const {
     const auto [value, problem] = ParseNumber(text);
-    if (!problem.empty()) Fail(at, "'" + text.substr(0, 40) + "' " + std::string(problem));
+    if (!problem.empty()) Fail(at, fmt::format("'{}' {}", text.substr(0, 40), problem));
     if (!(lower <= value && value <= upper))
       Fail(at, fmt::format("{} is outside [{}, {}]", text, ToText(lower), ToText(upper)));
     return value;
@@ -213,7 +213,7 @@ class ObstacleReader {
     }
     if (motion.empty()) in_.Fail(at, "has no state and no occupancy");
     if (motion.size() == known) {
-      world_.notes.push_back("No prediction of " + name + ": it is taken to stand where it is.");
+      world_.notes.push_back(fmt::format("No prediction of {}: it is taken to stand where it is.", name));
       return AddStanding(name, motion.front());
     }
     AddMoving(at, name, motion);
@@ -289,6 +289,7 @@ class ObstacleReader {
         ++last;
       AddWindow(name, {motion.begin() + static_cast<std::ptrdiff_t>(i),
                        motion.begin() + static_cast<std::ptrdiff_t>(last) + 1});
+      // The next window begins with the state that ends this one: between them nothing is left out.
       i = std::max(i + 1, last);
     }
     first_end_ = std::min(first_end_.value_or(kInfinity), motion.back().time.upper);
@@ -355,8 +356,8 @@ class RoadReader {
   void Read(const XmlElement& root) {
     for (const XmlElement* at : root.All("lanelet")) lanelets_.push_back(ReadLanelet(*at));
     for (const Lanelet& lanelet : lanelets_) {
-      AddBound(lanelet, lanelet.left, lanelet.left_id, "left bound of lanelet " + lanelet.id);
-      AddBound(lanelet, lanelet.right, lanelet.right_id, "right bound of lanelet " + lanelet.id);
+      AddBound(lanelet, lanelet.left, lanelet.left_id, fmt::format("left bound of lanelet {}", lanelet.id));
+      AddBound(lanelet, lanelet.right, lanelet.right_id, fmt::format("right bound of lanelet {}", lanelet.id));
     }
   }
 
@@ -475,8 +476,9 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
   const std::string* version = root->Attribute("commonRoadVersion");
   const std::string* step_text = root->Attribute("timeStepSize");
   if (!version || (*version != "2020a" && *version != "2018b"))
-    in.Fail(*root, "commonRoadVersion is " + (version ? *version : "missing") +
-                       ", has to be 2020a or 2018b; commonroad-io reads others and writes 2020a");
+    in.Fail(*root, fmt::format(
+                       "commonRoadVersion is {}, has to be 2020a or 2018b; commonroad-io reads others and writes 2020a",
+                       version ? *version : "missing"));
   if (!step_text) in.Fail(*root, "has no timeStepSize");
   const double step = in.Checked(*root, *step_text, 1e-6, 1e3);
   World world;
@@ -489,7 +491,7 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
     if (!kind.ends_with("Obstacle")) continue;
     ++counts[kind];
     const std::string* id = child->Attribute("id");
-    const std::string name = kind + " " + (id ? *id : "?");
+    const std::string name = fmt::format("{} {}", kind, id ? *id : "?");
     if (kind == "staticObstacle")
       obstacles.ReadStanding(*child, name);
     else if (kind == "environmentObstacle")

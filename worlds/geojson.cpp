@@ -6,7 +6,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "forereach/numerics/directed.h"
@@ -86,10 +85,12 @@ class Drawing {
   World Read(const Json& document) {
     const bool are_degrees = TakeReferenceSystem(document);
     TakeObject(JsonField(path_, document), nullptr, 0);
+    // Degrees that are taken for metres make a world of the size of a coin, in which nothing is hit.
     if (!options_.origin && !options_.are_metres && any_ && (are_degrees || LooksLikeDegrees()))
-      throw ConfigError(path_ +
-                        ": the coordinates look like degrees; give --origin LON,LAT, where x = y = 0, or --metres if "
-                        "they are metres");
+      throw ConfigError(
+          "{}: the coordinates look like degrees; give --origin LON,LAT, where x = y = 0, or --metres if "
+          "they are metres",
+          path_);
     AddStayIn();
     if (plane_)
       world_.notes.push_back(
@@ -117,11 +118,13 @@ class Drawing {
     const std::string system = at->get<std::string>();
     const auto is = [&](std::string_view code) { return system.ends_with(code); };
     if (is(":3857") || is(":900913") || is(":3785"))
-      throw ConfigError(path_ + ": crs: " + system.substr(0, 80) +
-                        " is Web Mercator, whose metres are not those of the ground; `ogr2ogr -t_srs EPSG:4326` makes "
-                        "degrees of them, for --origin");
+      throw ConfigError(
+          "{}: crs: {} is Web Mercator, whose metres are not those of the ground; `ogr2ogr -t_srs "
+          "EPSG:4326` makes degrees of them, for --origin",
+          path_, system.substr(0, 80));
     if (is("CRS84") || is(":4326")) return true;
-    world_.notes.push_back("Coordinates are taken as metres of a plane, with the crs " + system.substr(0, 80) + ".");
+    world_.notes.push_back(
+        fmt::format("Coordinates are taken as metres of a plane, with the crs {}.", system.substr(0, 80)));
     return false;
   }
 
@@ -138,11 +141,12 @@ class Drawing {
       const JsonField own = has_properties ? at["properties"] : at;
       const Json id = at.json().value("id", Json());
       feature_ = id.is_string() || id.is_number_integer()
-                     ? "feature " + (id.is_string() ? id.get<std::string>() : id.dump())
+                     ? fmt::format("feature {}", id.is_string() ? id.get<std::string>() : id.dump())
                      : std::string();
       if (!geometry.json().is_null()) TakeObject(geometry, has_properties ? &own : nullptr, depth);
     } else if (type == "GeometryCollection") {
       const JsonField geometries = at["geometries"];
+      // Each level is a call on the stack.
       if (depth > 8) at.Fail("is nested too deeply");
       for (std::size_t i = 0; i < geometries.Count(); ++i) TakeObject(geometries[i], properties, depth + 1);
     } else {
@@ -153,7 +157,7 @@ class Drawing {
   void TakeGeometry(const std::string& type, const JsonField& at, Style style) {
     constexpr std::string_view kTypes[] = {"Polygon",         "MultiPolygon", "LineString",
                                            "MultiLineString", "Point",        "MultiPoint"};
-    if (std::ranges::find(kTypes, type) == std::end(kTypes)) at.Fail("type " + type + " is none of GeoJSON's");
+    if (std::ranges::find(kTypes, type) == std::end(kTypes)) at.Fail(fmt::format("type {} is none of GeoJSON's", type));
     if (style.name.empty()) style.name = !feature_.empty() ? feature_ : at.name().empty() ? type : at.name();
     const JsonField coordinates = at["coordinates"];
     const auto each = [&](const auto& take) {
@@ -183,7 +187,7 @@ class Drawing {
     // Maps of others have texts in all properties.
     const Parsed<double> text = at.json().is_string() ? ParseNumber(at.json().get<std::string>()) : Parsed<double>{};
     if (!text.problem.empty())
-      at.Fail("'" + at.json().get<std::string>().substr(0, 40) + "' " + std::string(text.problem));
+      at.Fail(fmt::format("'{}' {}", at.json().get<std::string>().substr(0, 40), text.problem));
     const double size = at.json().is_string() ? text.value : at.Number();
     if (!(size >= 0 && size <= kFarthest)) at.Fail(fmt::format("{} is outside [0, {}]", ToText(size), kFarthest));
     return size;
@@ -266,7 +270,7 @@ class Drawing {
     try {
       return pieces();
     } catch (const NoPolygon& error) {
-      throw ConfigError(path_ + ": " + place + ": " + error.what());
+      throw ConfigError("{}: {}: {}", path_, place, error.what());
     }
   }
 
@@ -313,7 +317,7 @@ World ReadGeoJson(const std::string& path, const GeoJsonOptions& options) {
   try {
     document = ParseJson(text);
   } catch (const Json::exception& error) {
-    throw ConfigError(path + ": " + DescribeJsonError(error));
+    throw ConfigError("{}: {}", path, DescribeJsonError(error));
   }
   return Drawing(path, options).Read(document);
 }

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
-#include <utility>
 
 #include <fmt/format.h>
 
@@ -52,7 +51,7 @@ class PgmReader {
 
  private:
   [[noreturn]] void Fail(const std::string& what) const {
-    throw ConfigError(fmt::format("{}: at byte {}: {}", file_, all_ - rest_.size(), what));
+    throw ConfigError("{}: at byte {}: {}", file_, all_ - rest_.size(), what);
   }
 
   static bool IsSpace(char c) { return c == ' ' || ('\t' <= c && c <= '\r'); }
@@ -203,12 +202,13 @@ GrayImage ReadPng(const std::string& file, std::string_view bytes) {
     return value;
   };
   constexpr std::size_t kHead = 25;  // up to width, height and bits
+  // Looked at before the library allocates what the image says.
   if (bytes.size() < kHead || bytes.substr(8, 8) != std::string_view("\0\0\0\rIHDR", 8) ||
       std::uint64_t{number(16)} * number(20) > kMaxPixels)
-    throw ConfigError(fmt::format("{}: has no size, or more than {} pixels", file, kMaxPixels));
+    throw ConfigError("{}: has no size, or more than {} pixels", file, kMaxPixels);
   if (bytes[24] == 16)
     throw ConfigError(
-        file + ": has 16 bits a channel, of which 8 would be lost; `convert IMAGE map.pgm` of ImageMagick keeps them");
+        "{}: has 16 bits a channel, of which 8 would be lost; `convert IMAGE map.pgm` of ImageMagick keeps them", file);
   const auto read = [](void* rest, unsigned char* to, unsigned count) noexcept {
     auto& from = *static_cast<std::string_view*>(rest);
     if (count > from.size()) return CAIRO_STATUS_READ_ERROR;
@@ -222,7 +222,7 @@ GrayImage ReadPng(const std::string& file, std::string_view bytes) {
   const cairo_format_t format = cairo_image_surface_get_format(image);
   if (cairo_surface_status(image) != CAIRO_STATUS_SUCCESS ||
       (format != CAIRO_FORMAT_RGB24 && format != CAIRO_FORMAT_ARGB32))
-    throw ConfigError(file + ": is no PNG image that can be read");
+    throw ConfigError("{}: is no PNG image that can be read", file);
   GrayImage gray{cairo_image_surface_get_width(image), cairo_image_surface_get_height(image), 3 * 255, {}};
   for (int row = 0; row < gray.height; ++row) {
     const unsigned char* at =
@@ -231,10 +231,10 @@ GrayImage ReadPng(const std::string& file, std::string_view bytes) {
       std::uint32_t pixel = 0;
       std::memcpy(&pixel, at, sizeof pixel);
       if (format == CAIRO_FORMAT_ARGB32 && pixel >> 24 != 255)
-        throw ConfigError(fmt::format(
+        throw ConfigError(
             "{}: the pixel at column {}, row {} is not opaque; `convert IMAGE -background black -alpha remove map.png` "
             "of ImageMagick makes such cells occupied",
-            file, column, row));
+            file, column, row);
       gray.values.push_back(static_cast<std::uint16_t>((pixel >> 16 & 255) + (pixel >> 8 & 255) + (pixel & 255)));
     }
   }
@@ -246,7 +246,7 @@ GrayImage ReadPgm(const std::string& file, std::string_view bytes) { return PgmR
 World ReadOccupancyMap(const std::string& path, const MapOptions& options) try {
   const MapFile file = ReadMapFile(path);
   const std::string image_path = (std::filesystem::path(path).parent_path() / file.image).string();
-  const std::string bytes = ReadWhole(image_path, 12 * kMaxPixels, path + ": image: ");
+  const std::string bytes = ReadWhole(image_path, 12 * kMaxPixels, fmt::format("{}: image: ", path));
   const bool is_png = bytes.starts_with("\x89PNG\r\n\x1a\n");
   const GrayImage image = is_png ? ReadPng(image_path, bytes) : ReadPgm(image_path, bytes);
   const OccupancyGrid::Map map = CellsOf(image, file, options);
@@ -267,10 +267,11 @@ World ReadOccupancyMap(const std::string& path, const MapOptions& options) try {
         "free.");
   if (file.mode == "raw") world.notes.push_back("Mode raw: what has a cost above 0 is occupied.");
   if (file.mode == "scale") world.notes.push_back("Mode scale: what is neither free nor occupied is occupied.");
-  for (const std::string& key : file.unknown_keys) world.notes.push_back("Ignored: " + key + " of the map's file.");
+  for (const std::string& key : file.unknown_keys)
+    world.notes.push_back(fmt::format("Ignored: {} of the map's file.", key));
   return world;
 } catch (const std::invalid_argument& error) {
-  throw ConfigError(path + ": " + error.what());
+  throw ConfigError("{}: {}", path, error.what());
 }
 
 }  // namespace forereach

@@ -7,7 +7,7 @@ namespace forereach {
 Box RegionOf(const Config& config) {
   const Problem& problem = *config.problem;
   if (problem.projection.rows() != 2)
-    throw ConfigError(config.path + ": has not two safety coordinates, so a map is no world of its robot");
+    throw ConfigError("{}: has not two safety coordinates, so a map is no world of its robot", config.path);
   const Box& states = problem.domain.state;
   const Eigen::VectorXd middle = problem.projection * (states.lower() + states.upper()) / 2;
   const Eigen::VectorXd half = problem.projection.cwiseAbs() * (states.upper() - states.lower()) / 2;

@@ -25,7 +25,7 @@ std::string GridText(const GridMap& map, const std::string& indent) {
       ToText(map.resolution), ToText(map.origin[0]), ToText(map.origin[1]), ToText(map.yaw),
       map.outside_is_free ? "free" : "occupied", map.width, map.height);
   for (int row = map.height; row-- > 0;) {
-    text += "\n" + indent + "  ";
+    text += fmt::format("\n{}  ", indent);
     for (int column = 0; column < map.width; ++column) text += map.IsOccupied(column, row) ? '#' : '.';
   }
   return text;
@@ -45,21 +45,21 @@ std::string ShapeText(const Obstacle& obstacle, const std::string& indent) {
   }
   std::string vertices;
   for (const Eigen::VectorXd& point : points) vertices += (vertices.empty() ? "" : ", ") + Numbers(point);
-  return "polygon: {vertices: [" + vertices + "]}";
+  return fmt::format("polygon: {{vertices: [{}]}}", vertices);
 }
 
 std::string NotesText(const World& world, const std::string& origin, const std::string& indent) {
-  std::string text = indent + "# The obstacles of " + Printable(origin) + ", by forereach import-world.\n";
-  for (const std::string& note : world.notes) text += indent + "# " + Printable(note) + "\n";
+  std::string text = fmt::format("{}# The obstacles of {}, by forereach import-world.\n", indent, Printable(origin));
+  for (const std::string& note : world.notes) text += fmt::format("{}# {}\n", indent, Printable(note));
   return text;
 }
 
 std::string ListText(const World& world, const std::string& indent) {
-  if (world.pieces.empty()) return indent + "obstacles: []\n";
+  if (world.pieces.empty()) return fmt::format("{}obstacles: []\n", indent);
   std::string text = indent + "obstacles:\n";
   for (const auto& [name, obstacle, window] : world.pieces) {
     text += fmt::format("{}  - {}", indent, ShapeText(obstacle, indent));
-    text += obstacle.grid() || name.empty() ? "\n" : "  # " + Printable(name) + "\n";
+    text += obstacle.grid() || name.empty() ? "\n" : fmt::format("  # {}\n", Printable(name));
     if (!obstacle.name().empty()) text += fmt::format("{}    name: {}\n", indent, obstacle.name());
     if (window)
       text += fmt::format("{}    motion: {{velocity: [0, 0], from: {}, until: {}}}\n", indent,
@@ -131,6 +131,7 @@ World Cropped(World world, const Box& region) {
     if (side == is_beyond.end()) return false;
     bool is_behind_a_cut = false;
     for (std::size_t i = 0; i < 4; ++i) is_behind_a_cut |= is_beyond[i] && is_cut[i];
+    // One half-plane stands for all that lies beyond that side.
     if (!is_behind_a_cut) is_cut[static_cast<std::size_t>(side - is_beyond.begin())] = true;
     return true;
   };
@@ -152,7 +153,7 @@ std::string WithObstacles(const std::string& task, const World& world, const std
   const std::size_t at = task.find(kLine), begin = task.rfind('\n', at) + 1;
   const bool is_line = at != std::string::npos && task.find_first_not_of(' ', begin) == at;
   if (!is_line || task.find(kLine, at + 1) != std::string::npos)
-    throw ConfigError(path + ": has to have one line `obstacles: []` in `task`, which is replaced");
+    throw ConfigError("{}: has to have one line `obstacles: []` in `task`, which is replaced", path);
   const std::string indent(at - begin, ' ');
   const std::size_t end = std::min(task.find('\n', at), task.size() - 1) + 1;
   return task.substr(0, begin) + NotesText(world, origin, indent) + ListText(world, indent) + task.substr(end);

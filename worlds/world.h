@@ -1,7 +1,6 @@
 /** What stands and moves in a plane, read from a map, a scenario or a drawing, and written as a task's obstacles. */
 #pragma once
 
-#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>

@@ -12,6 +12,7 @@
 namespace forereach {
 namespace {
 
+// The tree is freed by calls as deep as it is.
 constexpr std::size_t kDeepest = 64;
 
 // Expat's callbacks are called from C: an exception waits until the parser has returned.
@@ -22,6 +23,7 @@ class TreeBuilder {
     XML_SetUserData(parser_.get(), this);
     XML_SetElementHandler(parser_.get(), &TreeBuilder::Begin, &TreeBuilder::End);
     XML_SetCharacterDataHandler(parser_.get(), &TreeBuilder::Characters);
+    // With it entities go, which can name files and grow without end.
     XML_SetStartDoctypeDeclHandler(parser_.get(), &TreeBuilder::Doctype);
   }
 
@@ -36,9 +38,7 @@ class TreeBuilder {
  private:
   static constexpr std::size_t kLargest = std::size_t{1} << 30;
 
-  [[noreturn]] void Fail(int line, const std::string& what) const {
-    throw ConfigError(fmt::format("{}:{}: {}", file_, line, what));
-  }
+  [[noreturn]] void Fail(int line, const std::string& what) const { throw ConfigError("{}:{}: {}", file_, line, what); }
   [[nodiscard]] int Line() const { return static_cast<int>(XML_GetCurrentLineNumber(parser_.get())); }
 
   template <class Action>
