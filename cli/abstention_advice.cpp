@@ -1,7 +1,6 @@
 #include "cli/abstention_advice.h"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <iterator>
@@ -60,12 +59,12 @@ AbstentionAdvice AdviceFor(const RecordedAbstention& abstention, const BrakingTa
     Tube tube;
     const Decision again = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
     if (static_cast<std::int16_t>(again.outcome) != abstention.outcome)
-      advice.missing =
-          "judged again by what is recorded: " + Explain(again, *judged.problem, judged.obstacles, judged.plan(), tube);
+      advice.missing = fmt::format("judged again by what is recorded: {}",
+                                   Explain(again, *judged.problem, judged.obstacles, judged.plan(), tube));
     if (with_inner) advice.inner = BoundFromWithin(judged, certifier, tube);
     return advice;
   } catch (const std::invalid_argument& error) {
-    return {{}, {}, std::string("it cannot be judged again: ") + error.what(), {}};
+    return {{}, {}, fmt::format("it cannot be judged again: {}", error.what()), {}};
   }
 }
 
@@ -133,11 +132,11 @@ std::vector<AdviceGroup> GroupsOf(const AbstentionAdvice& advice) {
     } else if (!each.smaller.empty()) {
       smaller += (smaller.empty() ? "" : ", ") + each.smaller;
     } else {
-      not_enough.clauses.push_back(each.what + ": then it is \"" + each.then + "\"");
+      not_enough.clauses.push_back(fmt::format("{}: then it is \"{}\"", each.what, each.then));
     }
-  for (const auto& [kind, what] : first) enough.clauses.push_back(std::string(Name(kind)) + ": " + what);
+  for (const auto& [kind, what] : first) enough.clauses.push_back(fmt::format("{}: {}", Name(kind), what));
   if (!smaller.empty())
-    not_enough.clauses.push_back("if one of these were declared so many times as large: " + smaller);
+    not_enough.clauses.push_back(fmt::format("if one of these were declared so many times as large: {}", smaller));
   std::vector<AdviceGroup> groups;
   if (const auto& remedy = advice.remedy)
     groups.push_back({remedy->turns ? "it would be judged" : "it might be judged", false, {remedy->what}});
@@ -159,6 +158,7 @@ std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentio
       work.emplace_back(run, i);
     for (const auto& task : runs[run].tasks) tails[task.get()] = TailsOf(*task);
   }
+  // Those that missed by least first: if time runs out, these were the likeliest to be turned.
   std::ranges::stable_sort(work, {}, [&](const auto& each) { return Shortfall(runs[each.first].all[each.second]); });
   using Clock = std::chrono::steady_clock;
   const Clock::time_point begin = Clock::now();
@@ -166,6 +166,7 @@ std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentio
   ForEachInParallel(work.size(), jobs, [&](std::size_t k, std::size_t) {
     const auto [run, i] = work[k];
     const RecordedAbstention& abstention = runs[run].all[i];
+    // One is searched in any case.
     if (k > 0 && std::chrono::duration<double>(Clock::now() - begin).count() > seconds)
       advised[run][i].missing = fmt::format(
           "not searched within {:g} s: `forereach advise` searches all, or write a longer --advice-seconds", seconds);
@@ -187,6 +188,7 @@ std::optional<InnerBound> BoundFromWithin(const Case& judged, const Certifier& c
   const bool is_box = ((judged.initial_set.GeneratorMatrix().array() != 0).colwise().count().array() <= 1).all();
   const auto varying = (declaration.lipschitz.array() > 0).rowwise().any().count();
   const Eigen::Index wide = (half_width.array() > 0).count();
+  // What the inner bound is proven for (docs/soundness.md, 3.22), and few enough corners to try.
   if (!is_box || !declaration.affine.rows.empty() || !declaration.regions.empty() || declaration.HasErrorInZ() ||
       problem.projection.rows() != 2 || certifier.violation() || tube.length() == 0 ||
       problem.transitions.size() > kMostInnerObservations || std::max(varying, wide) > kMostInnerCoordinates)
@@ -222,8 +224,9 @@ std::string Describe(const InnerBound& bound) {
   std::string text = fmt::format("half-width at step {}: {} m; no sound tube is below {} m", bound.step,
                                  RoundedUp(bound.half_width), RoundedDown(bound.least));
   if (!bound.contact.empty())
-    text += "; no sound method could certify this with these data: of a system that agrees with all of them, " +
-            bound.contact;
+    text += fmt::format(
+        "; no sound method could certify this with these data: of a system that agrees with all of them, {}",
+        bound.contact);
   return text;
 }
 

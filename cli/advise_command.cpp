@@ -65,6 +65,7 @@ std::vector<std::pair<std::string, int>> PlacesOf(const Advised& all) {
   });
   std::vector<std::pair<std::string, int>> lines;
   for (const auto& [task, abstentions, places] : tasks) {
+    // Of one abstention its own advice says it.
     if (places.empty() || abstentions.size() < 2) continue;
     const auto problem = abstentions.back()->Judged().problem;
     std::vector<Case> cases;
@@ -164,7 +165,7 @@ Advised ReadRuns(const AdviseArguments& options) {
     if (run.logs.empty()) return Abstentions{};
     Abstentions of_run = ReadAbstentions(run, tasks, named.is_many || run.logs.size() > 1, kMostExamined);
     for (RecordedAbstention& each : of_run.all)
-      if (named.is_many) each.name = run.robot + ": " + each.name;
+      if (named.is_many) each.name = fmt::format("{}: {}", run.robot, each.name);
     return of_run;
   });
   for (auto& of_run : read) all.runs.push_back(of_run ? std::move(*of_run) : Abstentions{});
@@ -174,13 +175,13 @@ Advised ReadRuns(const AdviseArguments& options) {
     named.missing.push_back(fmt::format("of {} abstentions and rejections the last {} of each run are examined",
                                         count + left_out, kMostExamined));
   if (std::ranges::all_of(all.runs, [](const Abstentions& run) { return run.tasks.empty(); }))
-    throw ConfigError(options.files[0] + ": " + (named.missing.empty() ? "no decisions" : named.missing[0]));
+    throw ConfigError("{}: {}", options.files[0], named.missing.empty() ? "no decisions" : named.missing[0]);
   return all;
 }
 
 Advised ReadDecision(const AdviseArguments& options) {
   if (options.shard.is_given())
-    throw ConfigError(options.files[0] + ": --shard divides logs, and this is a single decision");
+    throw ConfigError("{}: --shard divides logs, and this is a single decision", options.files[0]);
   Advised all;
   all.runs.push_back(AbstentionOf(options.files[0], options.config));
   return all;

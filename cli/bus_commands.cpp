@@ -88,7 +88,7 @@ std::string DescribeRefused(const certifier_status_t& status) {
                                     {status.refused_replayed, "replayed or signed by another clock"},
                                     {status.refused_foreign, "of another bus"},
                                     {status.messages_refused, "of no use; its log says why"}})
-    if (count > 0) text += (text.empty() ? "messages refused: " : ", ") + std::to_string(count) + " " + what;
+    if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "messages refused: " : ", ", count, what);
   return text;
 }
 
@@ -178,7 +178,7 @@ Command BusCommand(const std::string& name, const std::string& purpose,
   const auto options = std::make_shared<CommandArguments>();
   Command command{.name = name,
                   .purpose = purpose,
-                  .footer = "Example:\n  forereach " + name + " --config config/demo.yaml",
+                  .footer = fmt::format("Example:\n  forereach {} --config config/demo.yaml", name),
                   .options = {ConfigOption(options->config, "The task file of the certifier"), JsonFlag(options->json)},
                   .run = [options, run] { return run(*options); }};
   options->bus.AddTo(command.options);

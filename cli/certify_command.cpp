@@ -98,9 +98,10 @@ int Certify(const CertifyArguments& options) {
   const Plan plan{controls.data(), inputs, steps, inputs, ScheduleFromZero(config, steps)};
   const Zonotope initial_set = Zonotope::Enclose(config.initial_set);
   try {
+    // What Certify takes for granted comes from files here: a wrong one is an error, not an abstention.
     certifier.Require(plan, initial_set, config.obstacles);
   } catch (const std::invalid_argument& error) {
-    throw ConfigError(options.plan + ": " + error.what());
+    throw ConfigError("{}: {}", options.plan, error.what());
   }
 
   Tube tube;

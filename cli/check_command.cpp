@@ -1,10 +1,9 @@
 #include <algorithm>
-#include <iomanip>
 #include <iostream>
 #include <memory>
-#include <sstream>
 #include <vector>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "advise/task_check.h"
@@ -35,26 +34,26 @@ std::vector<std::size_t> ShownSteps(std::size_t last) {
 }
 
 void PrintData(const TaskCheck& check, std::ostream& out) {
-  out << "data: " << check.data << ", " << check.transitions << " transitions\n";
+  out << fmt::format("data: {}, {} transitions\n", check.data, check.transitions);
   if (check.coordinates.empty()) return;
-  out << "  " << std::left << std::setw(20) << "coordinate" << std::setw(24) << "domain" << std::setw(24) << "data"
-      << "the declared error depends on it\n";
+  const auto line = [&](const auto&... cells) { out << fmt::format("  {:<20}{:<24}{:<24}{}\n", cells...); };
+  line("coordinate", "domain", "data", "the declared error depends on it");
   constexpr std::size_t kShort = 8;  // characters of a number that is shown as it is
   const auto number = [](double x, const std::string& rounded) {
     const std::string text = ToText(x);
     return text.size() <= kShort ? text : rounded;
   };
   const auto range = [&](double lower, double upper) {
-    return "[" + number(lower, RoundedDown(lower, 4)) + ", " + number(upper, RoundedUp(upper, 4)) + "]";
+    return fmt::format("[{}, {}]", number(lower, RoundedDown(lower, 4)), number(upper, RoundedUp(upper, 4)));
   };
   for (const TaskCheck::Coordinate& coordinate : check.coordinates)
-    out << "  " << std::setw(20) << coordinate.name << std::setw(24) << range(coordinate.lower, coordinate.upper)
-        << std::setw(24) << range(coordinate.least, coordinate.largest) << (coordinate.matters ? "yes" : "no") << "\n";
+    line(coordinate.name, range(coordinate.lower, coordinate.upper), range(coordinate.least, coordinate.largest),
+         coordinate.matters ? "yes" : "no");
   if (check.rows.empty()) return;
   std::string used, undeclared;
   for (const TaskCheck::Row& row : check.rows)
     if (row.is_declared)
-      used += "  " + row.name + " " + RoundedUp(100 * row.used, 3) + " %";
+      used += fmt::format("  {} {} %", row.name, RoundedUp(100 * row.used, 3));
     else
       undeclared += (undeclared.empty() ? "" : ", ") + row.name;
   if (!used.empty())
@@ -65,14 +64,14 @@ void PrintData(const TaskCheck& check, std::ostream& out) {
 
 void PrintTube(const TaskCheck& check, const CheckArguments& options, std::ostream& out) {
   if (check.half_widths.empty()) return;
-  out << "tube without obstacles, " << check.planned_steps << " steps of "
-      << (options.check.plan.empty() ? "the inputs closest to zero" : options.check.plan)
-      << ": half-width of each slice\n  " << std::setw(6) << "step" << std::setw(8) << "s";
-  for (const std::string& state : check.states) out << std::setw(12) << state;
+  out << fmt::format("tube without obstacles, {} steps of {}: half-width of each slice\n  {:<6}{:<8}",
+                     check.planned_steps,
+                     options.check.plan.empty() ? "the inputs closest to zero" : options.check.plan, "step", "s");
+  for (const std::string& state : check.states) out << fmt::format("{:<12}", state);
   out << "\n";
   for (const std::size_t t : ShownSteps(check.half_widths.size() - 1)) {
-    out << "  " << std::setw(6) << t << std::setw(8) << RoundedDown(static_cast<double>(t) * check.period, 4);
-    for (const double width : check.half_widths[t]) out << std::setw(12) << RoundedUp(width, 4);
+    out << fmt::format("  {:<6}{:<8}", t, RoundedDown(static_cast<double>(t) * check.period, 4));
+    for (const double width : check.half_widths[t]) out << fmt::format("{:<12}", RoundedUp(width, 4));
     out << "\n";
   }
 }
@@ -80,9 +79,8 @@ void PrintTube(const TaskCheck& check, const CheckArguments& options, std::ostre
 void PrintFindings(const TaskCheck& check, std::ostream& out) {
   const auto remarks = std::ranges::count_if(check.findings, &TaskFinding::is_remark);
   const auto findings = std::ssize(check.findings) - remarks;
-  out << (findings == 0 ? std::string("a plan could be certified")
-                        : std::to_string(findings) + (findings == 1 ? " finding" : " findings"))
-      << (remarks == 0 ? "" : ", " + std::to_string(remarks) + (remarks == 1 ? " remark" : " remarks")) << "\n";
+  out << (findings == 0 ? "a plan could be certified" : fmt::format("{} finding{}", findings, findings == 1 ? "" : "s"))
+      << (remarks == 0 ? "" : fmt::format(", {}{}", remarks, remarks == 1 ? " remark" : " remarks")) << "\n";
   for (const TaskFinding& finding : check.findings)
     out << finding.place << (finding.is_remark ? "remark: " : "") << finding.what << "\n    " << finding.advice << "\n";
 }
@@ -125,7 +123,7 @@ int Check(const CheckArguments& options) {
   TaskCheck check = CheckTask(options.check);
   const HeldOutSteps held_out = JudgeTask(options.check.config);
   if (const std::string warning = WarningOf(held_out); !warning.empty())
-    check.findings.push_back({.place = options.check.config + ": declaration: ",
+    check.findings.push_back({.place = fmt::format("{}: declaration: ", options.check.config),
                               .what = warning,
                               .advice = "declare more: `forereach declare --from-data` proposes a disturbance"});
   const bool lacks_picture = !files.empty() && !check.is_planar;
@@ -135,14 +133,14 @@ int Check(const CheckArguments& options) {
   if (options.json) {
     std::cout << JsonText(ToJson(check, rests_on, held_out)) << std::endl;
   } else {
-    std::ostringstream out;
+    std::ostream& out = std::cout;
     PrintData(check, out);
     if (held_out.slices() > 0) out << "held out, by the other half of the data: " << TextOf(held_out) << "\n";
     PrintTube(check, options, out);
     PrintHypotheses(rests_on, out);
     PrintFindings(check, out);
     for (const std::string& file : files) out << "picture: " << file << "\n";
-    std::cout << out.str() << std::flush;
+    out << std::flush;
   }
   if (lacks_picture) throw PictureError("picture: the task's safety coordinates are not two, so there is no picture");
   return check.HasFindings() ? 1 : 0;

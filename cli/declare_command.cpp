@@ -5,7 +5,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
@@ -43,15 +42,14 @@ struct DeclareArguments {
 // A residual of the model, as a task file may write it.
 std::string ExampleFor(const NominalModel& model) {
   const std::string& state = model.state_names().back();
-  return "residual: {parameters: {c: [0.1, 0.2]}, add: {" + state + ": -c*abs(" + state + ")}}";
+  return fmt::format("residual: {{parameters: {{c: [0.1, 0.2]}}, add: {{{}: -c*abs({})}}}}", state, state);
 }
 
 Config LoadWithResidual(const std::string& path) {
   Config config = LoadConfig(path, TransitionsFile::kIgnore);
   if (!config.residual)
-    throw ConfigError(path +
-                      ":1: residual: missing: what the robot's next state has beyond the model's; for example  " +
-                      ExampleFor(*config.problem->model));
+    throw ConfigError("{}:1: residual: missing: what the robot's next state has beyond the model's; for example  {}",
+                      path, ExampleFor(*config.problem->model));
   return config;
 }
 
@@ -95,7 +93,7 @@ std::vector<std::size_t> FreeArguments(const ResidualSlopes& slopes, const Confi
 
 template <class Entry>
 std::string NameOf(const Entry& entry, const std::vector<std::string>& names) {
-  return names[ToSize(entry.row)] + " by " + names[ToSize(entry.column)];
+  return fmt::format("{} by {}", names[ToSize(entry.row)], names[ToSize(entry.column)]);
 }
 
 // Rejects a slope without a finite bound. @throws std::invalid_argument that names the slope and a box.
@@ -104,18 +102,17 @@ void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, 
   for (const SlopeBound& bound : bounds) {
     if (!bound.unbounded.empty()) {
       const std::string box = Joined(FreeArguments(slopes, config, bound.row), [&](std::size_t i) {
-        return names[i] + " in [" + RoundedDown(bound.unbounded[i].lower, kBoundDigits) + ", " +
-               RoundedUp(bound.unbounded[i].upper, kBoundDigits) + "]";
+        return fmt::format("{} in [{}, {}]", names[i], RoundedDown(bound.unbounded[i].lower, kBoundDigits),
+                           RoundedUp(bound.unbounded[i].upper, kBoundDigits));
       });
-      throw std::invalid_argument("no finite bound for the slope of " + NameOf(bound, names) + ": " +
-                                  config.residual->name + " has none over " + box + ", found after " +
-                                  std::to_string(bound.boxes) + " boxes; take this box out of `domain` in " +
-                                  config.path +
-                                  " (narrow its bounds, or add an inequality or ball), narrow the residual's "
-                                  "parameters, or raise --max-boxes if the box is wide");
+      throw std::invalid_argument(
+          fmt::format("no finite bound for the slope of {}: {} has none over {}, found after {} boxes; take this box "
+                      "out of `domain` in {} (narrow its bounds, or add an inequality or ball), narrow the residual's "
+                      "parameters, or raise --max-boxes if the box is wide",
+                      NameOf(bound, names), config.residual->name, box, bound.boxes, config.path));
     }
     if (std::ranges::all_of(bound.cover.nodes, [](const auto& node) { return node.outside || node.argument >= 0; }))
-      throw ConfigError(config.path + ": domain: no point of its box satisfies its inequalities and balls");
+      throw ConfigError("{}: domain: no point of its box satisfies its inequalities and balls", config.path);
   }
 }
 
@@ -124,8 +121,9 @@ std::string Yaml(const std::vector<SlopeBound>& bounds, const std::vector<std::s
   std::string text = "lipschitz: {";
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     const bool same_row = i > 0 && bounds[i - 1].row == bounds[i].row;
-    if (!same_row) text += (i > 0 ? "}, " : "") + names[ToSize(bounds[i].row)] + ": {";
-    text += (same_row ? ", " : "") + names[ToSize(bounds[i].column)] + ": " + RoundedUp(bounds[i].upper, kBoundDigits);
+    if (!same_row) text += fmt::format("{}{}: {{", i > 0 ? "}, " : "", names[ToSize(bounds[i].row)]);
+    text += fmt::format("{}{}: {}", same_row ? ", " : "", names[ToSize(bounds[i].column)],
+                        RoundedUp(bounds[i].upper, kBoundDigits));
   }
   return text + (bounds.empty() ? "}" : "}}");
 }
@@ -163,21 +161,21 @@ std::string Yaml(const std::vector<Region>& regions, const std::vector<SlopeBoun
   for (const Region& region : regions) {
     std::string rows;
     const std::string box = Joined(region.box, [&](const auto& side) {
-      return name(side.variable) + ": [" + ToText(side.range.lower) + ", " + ToText(side.range.upper) + "]";
+      return fmt::format("{}: [{}, {}]", name(side.variable), ToText(side.range.lower), ToText(side.range.upper));
     });
     for (std::size_t i = 0; i < bounds.size(); ++i) {
       const int row = bounds[i].row, column = bounds[i].column;
       const double whole = bounds[i].upper;
       const double slope = MulUp(kRoom, region.lipschitz(row, column));
-      if (i == 0 || bounds[i - 1].row != row) rows += (i > 0 ? "}, " : "") + name(row) + ": {";
+      if (i == 0 || bounds[i - 1].row != row) rows += fmt::format("{}{}: {{", i > 0 ? "}, " : "", name(row));
       if (!(slope > 0)) continue;
       if (!rows.ends_with('{')) rows += ", ";
-      rows += name(column) + ": " +
-              (slope < whole / kRoom ? RoundedUp(slope, kRegionDigits) : RoundedUp(whole, kBoundDigits));
+      rows += fmt::format("{}: {}", name(column),
+                          slope < whole / kRoom ? RoundedUp(slope, kRegionDigits) : RoundedUp(whole, kBoundDigits));
     }
-    text += "\n    - in: {" + box + "}\n      lipschitz: {" + rows + "}}";
+    text += fmt::format("\n    - in: {{{}}}\n      lipschitz: {{{}}}}}", box, rows);
   }
-  return text.empty() ? "" : "\n  regions:" + text;
+  return text.empty() ? "" : fmt::format("\n  regions:{}", text);
 }
 
 double LargestGap(const std::vector<SlopeBound>& bounds) {
@@ -296,9 +294,10 @@ std::vector<CoverFinding> CheckRecord(const CoverFile& file, const Config& confi
   for (const auto& [row, column] : checker.Entries()) {
     const auto count = std::ranges::count_if(
         file.claims, [&, k = row, l = column](const auto& claim) { return claim.row == k && claim.column == l; });
+    // With none, the slope is not proven; with two, it is not said which of them is declared.
     if (count != 1)
-      refute(names[ToSize(row)] + " by " + names[ToSize(column)],
-             "stands " + std::to_string(count) + " times in the cover, has to stand once");
+      refute(fmt::format("{} by {}", names[ToSize(row)], names[ToSize(column)]),
+             fmt::format("stands {} times in the cover, has to stand once", count));
   }
   return findings;
 }
@@ -328,19 +327,21 @@ std::vector<CoverFinding> CheckRegions(const Config& config, std::size_t& count)
   for (std::size_t i = 0; i < problem.declaration.regions.size(); ++i) {
     const Region& region = problem.declaration.regions[i];
     const std::optional<Domain> part = PartIn(problem.domain, region);
+    // Outside of the domain nothing is claimed.
     if (!part) continue;
     if (region.bound.size() > 0)
-      findings.push_back({verifier::Answer::kUnknown, "declaration.regions[" + std::to_string(i) + "].bound",
+      findings.push_back({verifier::Answer::kUnknown, fmt::format("declaration.regions[{}].bound", i),
                           "nothing is proven of it here, only of slopes"});
     const verifier::CoverChecker checker(*part, *config.residual);
     for (const auto& [row, column] : checker.Entries()) {
       const double slope = region.lipschitz(row, column);
+      // The claim for the whole domain says it already.
       if (!(slope < problem.declaration.lipschitz(row, column))) continue;
       const verifier::SlopeClaim claim{row, column, slope, {{Cover::Node{.number = slope}}}};
       const verifier::CoverVerdict verdict = checker.Check(claim);
       ++count;
       findings.push_back(
-          {verdict.answer, "declaration.regions[" + std::to_string(i) + "]: " + NameOf(claim, names), verdict.what});
+          {verdict.answer, fmt::format("declaration.regions[{}]: {}", i, NameOf(claim, names)), verdict.what});
     }
   }
   return findings;

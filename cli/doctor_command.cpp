@@ -14,6 +14,7 @@
 #include <sstream>
 #include <vector>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "bus/authentic.h"
@@ -58,7 +59,7 @@ Check CheckLoopback() {
   ifreq request{};
   std::copy_n("lo", 3, request.ifr_name);
   const bool up = ioctl(socket.get(), SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP);
-  return {"loopback interface", up, up ? "up" : "down", ReadyCommand() + ", or: ip link set lo up"};
+  return {"loopback interface", up, up ? "up" : "down", fmt::format("{}, or: ip link set lo up", ReadyCommand())};
 }
 
 // The interface of the most specific route to `group`, empty if there is none. The kernel's table has addresses and
@@ -86,14 +87,15 @@ std::string InterfaceOfRoute(const std::string& group) {
 
 Check CheckRoute(const std::string& group) {
   const std::string interface = InterfaceOfRoute(group);
-  return {"multicast route to " + group, interface == "lo", interface.empty() ? "none" : "by " + interface,
-          ReadyCommand() + ", or: ip route add 224.0.0.0/4 dev lo"};
+  return {fmt::format("multicast route to {}", group), interface == "lo",
+          interface.empty() ? "none" : fmt::format("by {}", interface),
+          fmt::format("{}, or: ip route add 224.0.0.0/4 dev lo", ReadyCommand())};
 }
 
 Check CheckBuffer() {
   const long bytes = GrantedReceiveBufferBytes();
-  return {"receive buffer limit", bytes >= kReceiveBufferBytes, std::to_string(bytes) + " bytes",
-          "a burst of plans may be lost; as root: sysctl -w net.core.rmem_max=" + std::to_string(kReceiveBufferBytes)};
+  return {"receive buffer limit", bytes >= kReceiveBufferBytes, fmt::format("{} bytes", bytes),
+          fmt::format("a burst of plans may be lost; as root: sysctl -w net.core.rmem_max={}", kReceiveBufferBytes)};
 }
 
 Check CheckRoundTrip(const std::string& url) {
@@ -113,17 +115,18 @@ Check CheckRoundTrip(const std::string& url) {
         times_us.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
     }
   } catch (const BusError& error) {
-    return {"round trip on " + url, false, "no bus", error.what()};
+    return {fmt::format("round trip on {}", url), false, "no bus", error.what()};
   }
   std::ranges::sort(times_us);
   const auto at = [&](double fraction) {
     return std::to_string(
         std::lround(times_us[static_cast<std::size_t>(fraction * static_cast<double>(times_us.size() - 1))]));
   };
-  const std::string count = std::to_string(times_us.size()) + " of " + std::to_string(kRoundTrips) + " arrived";
-  if (times_us.empty()) return {"round trip on " + url, false, count, "is multicast filtered by a firewall?"};
-  return {"round trip on " + url, times_us.size() == kRoundTrips,
-          count + ", p50 " + at(0.5) + " us, p99 " + at(0.99) + " us",
+  const std::string count = fmt::format("{} of {} arrived", times_us.size(), kRoundTrips);
+  if (times_us.empty())
+    return {fmt::format("round trip on {}", url), false, count, "is multicast filtered by a firewall?"};
+  return {fmt::format("round trip on {}", url), times_us.size() == kRoundTrips,
+          fmt::format("{}, p50 {} us, p99 {} us", count, at(0.5), at(0.99)),
           "messages are lost: raise the receive buffer limit, see above"};
 }
 
@@ -133,10 +136,11 @@ std::string RolesIn(const std::string& path) {
   for (const Role role : kAllRoles) {
     const std::string file = path + "/" + std::string(RoleName(role)) + ".key";
     if (!std::filesystem::exists(file)) continue;
+    // A file that the role's process would refuse is told here.
     static_cast<void>(LoadKeys(file, role));
     roles += (roles.empty() ? "" : ", ") + std::string(RoleName(role));
   }
-  return roles.empty() ? "" : "; secrets of " + roles;
+  return roles.empty() ? "" : fmt::format("; secrets of {}", roles);
 }
 
 Check CheckKeys(const BusOptions& bus) {
@@ -145,7 +149,8 @@ Check CheckKeys(const BusOptions& bus) {
             "forereach keygen --robot NAME DIR, then --key DIR for every process, or bus.key in the task file", true};
   try {
     const KeyRing keys = LoadPublicKeys(bus.key);
-    return {"keys", true, bus.key + " of robot " + keys.robot() + ", for bus " + bus.bus_name() + RolesIn(bus.key), ""};
+    return {"keys", true,
+            fmt::format("{} of robot {}, for bus {}{}", bus.key, keys.robot(), bus.bus_name(), RolesIn(bus.key)), ""};
   } catch (const KeyError& error) {
     return {"keys", false, error.what(), "no process starts with it"};
   }
@@ -157,6 +162,7 @@ StepTimes Listen(const Config& config, BusOptions channels, double seconds) {
   const std::unique_ptr<Bus> bus = OpenBus(channels, Role::kOperator);
   StepTimes times(StepUs(config));
   const auto bytes = [&](const Received& received) {
+    // Without keys here, the robot may sign all the same: times are only measured, and nothing rests on them.
     return channels.keys ? received.bytes : WithoutSignature(received.raw);
   };
   bus->Subscribe(channels.transition, [&](const Received& received) {
@@ -198,8 +204,7 @@ int Diagnose(const BusOptions& bus, bool json) {
       {"forereach", FOREREACH_VERSION},
       {"lcm", BusVersion()},
       {"compiler", __VERSION__},
-      {"eigen", std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
-                    std::to_string(EIGEN_MINOR_VERSION)}};
+      {"eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)}};
   const std::vector<Check> checks{CheckLoopback(), CheckRoute(ParseMulticastUrl(url).group), CheckBuffer(),
                                   CheckRoundTrip(url), CheckKeys(bus)};
   const bool good = std::ranges::all_of(checks, [](const Check& check) { return check.good || check.warning; });

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "cli/commands.h"
 #include "command_line/progress.h"
 #include "forereach/numerics/parallel.h"
@@ -65,7 +67,7 @@ std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, unsigned jobs, c
   const auto threads = static_cast<unsigned>(std::max<std::size_t>(jobs / std::max<std::size_t>(count, 1), 1));
   std::size_t units = 0;
   for (const RunLogs& run : named.runs) units += RunWork::UnitsOf(run);
-  Progress progress("MB of logs " + done, units);
+  Progress progress(fmt::format("MB of logs {}", done), units);
   const auto make = [&](const RunLogs& run) -> Result {
     RunWork work(threads, progress);
     Result result = one(run, work);
@@ -82,7 +84,7 @@ std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, unsigned jobs, c
       reasons[i] = error.what();
     } catch (const std::invalid_argument& error) {  // a task that no certifier accepts
       if (!named.is_many) throw;
-      reasons[i] = NameOf(named.runs[i]) + ": " + error.what();
+      reasons[i] = fmt::format("{}: {}", NameOf(named.runs[i]), error.what());
     }
   });
   for (std::string& reason : reasons)

@@ -44,11 +44,8 @@ std::string PlainStem(const std::string& path) {
 std::vector<std::string> NamesOf(const ExportArguments& options, const NamedRuns& named) {
   if (options.what.format == ExportFormat::kCsv) return ExportFiles(options.what.format);
   std::vector<std::string> names;
-  for (std::size_t i = 0; i < named.runs.size(); ++i) {
-    std::string number = std::to_string(i + 1);
-    number.insert(0, 4 - std::min<std::size_t>(number.size(), 4), '0');
-    names.push_back(number + "-" + PlainStem(NameOf(named.runs[i])) + "." + options.format);
-  }
+  for (std::size_t i = 0; i < named.runs.size(); ++i)
+    names.push_back(fmt::format("{:04}-{}.{}", i + 1, PlainStem(NameOf(named.runs[i])), options.format));
   return names;
 }
 
@@ -62,7 +59,8 @@ void RequireNoOutput(const ExportArguments& options, const NamedRuns& named) {
   if (!IsDirectory(options, named) || !fs::is_directory(options.output, error) || fs::is_symlink(options.output, error))
     return static_cast<void>(OutputFile(options.output));
   if (!fs::is_empty(options.output, error))
-    throw OutputError(options.output + ": the directory is not empty, and is not changed; choose another name");
+    throw OutputError(
+        fmt::format("{}: the directory is not empty, and is not changed; choose another name", options.output));
 }
 
 void WriteTable(const ExportArguments& options, const std::vector<std::optional<ExportResult>>& results, std::size_t k,
@@ -76,8 +74,9 @@ void WriteTable(const ExportArguments& options, const std::vector<std::optional<
 // What is written before it has its name. After a kill it stays.
 struct PartsDirectory {
   explicit PartsDirectory(const std::string& output) {
+    // Beside the output: a rename cannot leave its file system.
     std::string name = output + ".part-XXXXXX";
-    if (!mkdtemp(name.data())) throw OutputError(name + ": cannot be made: " + std::strerror(errno));
+    if (!mkdtemp(name.data())) throw OutputError(fmt::format("{}: cannot be made: {}", name, std::strerror(errno)));
     path = name;
   }
   ~PartsDirectory() {
@@ -107,7 +106,7 @@ void Write(const ExportArguments& options, const NamedRuns& named,
       GiveName(results[k]->files.front(), (made / names[k]).string());
   }
   fs::rename(made, options.output, error);
-  if (error) throw OutputError(options.output + ": cannot be written: " + error.message());
+  if (error) throw OutputError(fmt::format("{}: cannot be written: {}", options.output, error.message()));
 }
 
 void Describe(const ExportArguments& options, const ExportResult& result, const NamedRuns& named) {
@@ -135,7 +134,7 @@ void Describe(const ExportArguments& options, const ExportResult& result, const 
 
 void SetFormat(ExportArguments& options, bool is_many) {
   const auto found = std::ranges::find(kExportFormats, options.format);
-  if (found == kExportFormats.end()) throw ConfigError("no format of an export is called " + options.format);
+  if (found == kExportFormats.end()) throw ConfigError("no format of an export is called {}", options.format);
   options.what.format = static_cast<ExportFormat>(found - kExportFormats.begin());
   options.what.names_robot = is_many;
   if (options.output.size() > 1 && options.output.ends_with('/')) options.output.pop_back();
@@ -223,7 +222,7 @@ int WriteMergedExport(const Shards& shards, const std::string& out) {
     *result += std::move(*of_run).Sum();
   }
   if (!named.is_many && (results.size() != 1 || !results.front()))
-    throw ConfigError(shards.files().front() + ": has not the result of one run");
+    throw ConfigError("{}: has not the result of one run", shards.files().front());
   return Finish(options, named, results, parts);
 }
 

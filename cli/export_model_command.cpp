@@ -3,6 +3,8 @@
 #include <iostream>
 #include <memory>
 
+#include <fmt/core.h>
+
 #include "cli/commands.h"
 #include "forereach/dynamics/equations_header.h"
 #include "records/output_file.h"
@@ -28,13 +30,14 @@ int ExportModel(const ExportModelArguments& options) {
   const Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
   const ModelText* text = config.problem->model->text();
   if (text == nullptr)
-    throw ConfigError(options.config + ": model: " + config.problem->model->name() +
-                      " is compiled already; what can be exported is a model with its equations as text");
+    throw ConfigError("{}: model: {} is compiled already; what can be exported is a model with its equations as text",
+                      options.config, config.problem->model->name());
   const bool is_inline = std::filesystem::path(text->file) == std::filesystem::path(options.config);
   const std::string own = is_inline ? std::filesystem::path(options.config).stem().string() : text->name;
   const std::string name = WordOf(options.name.empty() ? own : options.name);
-  const std::string origin = "The equations of " + std::filesystem::path(text->file).filename().string() +
-                             " as C++, written by `forereach export-model`. Write it again when they change.";
+  const std::string origin =
+      fmt::format("The equations of {} as C++, written by `forereach export-model`. Write it again when they change.",
+                  std::filesystem::path(text->file).filename().string());
   std::string header;
   try {
     header = EquationsHeader(*text, name, origin);

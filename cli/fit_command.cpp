@@ -3,7 +3,6 @@
 #include <stdexcept>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
@@ -33,6 +32,7 @@ std::vector<std::string> NamesOf(const std::string& given, const ModelText& text
   std::vector<std::string> names = SplitAtCommas(given);
   if (given.empty())
     for (const ModelText::Parameter& parameter : text.parameters)
+      // The step is the task's, and the data were imported with it.
       if (parameter.name != "dt") names.push_back(parameter.name);
   return names;
 }
@@ -46,14 +46,17 @@ std::string Short(double value) { return fmt::format("{:.{}g}", value, kFitDigit
 std::string DeviationText(const FittedParameter& parameter) {
   if (std::isnan(parameter.deviation)) return "none: no informative number is left over to show the noise";
   if (std::isfinite(parameter.deviation)) return Short(parameter.deviation);
-  if (!parameter.together.empty()) return "not determined, only together with " + Joined(parameter.together);
-  return parameter.elsewhere ? "not determined: it has no effect near " + Short(parameter.after) + "; begin elsewhere"
-                             : "not determined: it has no effect on these transitions";
+  if (!parameter.together.empty())
+    return fmt::format("not determined, only together with {}", Joined(parameter.together));
+  return parameter.elsewhere
+             ? fmt::format("not determined: it has no effect near {}; begin elsewhere", Short(parameter.after))
+             : "not determined: it has no effect on these transitions";
 }
 
 std::string Yaml(const Fit& fit) {
-  return "parameters: {" +
-         Joined(fit.parameters, [](const FittedParameter& each) { return each.name + ": " + Short(each.after); }) + "}";
+  return fmt::format("parameters: {{{}}}", Joined(fit.parameters, [](const FittedParameter& each) {
+                       return fmt::format("{}: {}", each.name, Short(each.after));
+                     }));
 }
 
 Json ToJson(const Fit& fit, const NominalModel& model) {
@@ -109,15 +112,15 @@ int RunFit(const FitArguments& options) {
   const Problem& problem = *config.problem;
   const ModelText* text = problem.model->text();
   if (!text)
-    throw ConfigError(config.path + ": model: " + problem.model->name() +
-                      " is compiled; only the parameters of a model as text can be fitted");
+    throw ConfigError("{}: model: {} is compiled; only the parameters of a model as text can be fitted", config.path,
+                      problem.model->name());
   const Transitions transitions = LoadTransitions(config.transitions, *problem.model);
   RequireNoWrappedAngle(config.path, config.transitions, *problem.model, transitions);
   Fit fit;
   try {
     fit = FitParameters(*text, transitions, NamesOf(options.names, *text));
   } catch (const std::invalid_argument& error) {
-    throw ConfigError(config.path + ": " + error.what());
+    throw ConfigError("{}: {}", config.path, error.what());
   }
   if (options.json)
     std::cout << JsonText(ToJson(fit, *problem.model)) << std::endl;

@@ -32,7 +32,7 @@ void SetDay(const std::string& text, Store::WhichTransitions& which) {
                        std::from_chars(end - 2, end, day).ptr == end;
   const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
                                          std::chrono::day(static_cast<unsigned>(day))};
-  if (!is_date || !date.ok()) throw ConfigError("--day: " + Printable(text) + " is no day, for example 2026-01-31");
+  if (!is_date || !date.ok()) throw ConfigError("--day: {} is no day, for example 2026-01-31", Printable(text));
   using std::chrono::microseconds;
   which.from = std::chrono::duration_cast<microseconds>(std::chrono::sys_days(date).time_since_epoch()).count();
   which.until = which.from + microseconds(std::chrono::days(1)).count();
@@ -42,7 +42,7 @@ FleetTransitions Read(const FleetImportArguments& options, const Config& task) t
   Store store(options.database);
   return ReadTransitions(store, task, options.which, options.by == "day" ? TransitionsBy::kDay : TransitionsBy::kRobot);
 } catch (const std::invalid_argument& error) {  // a task that no certifier accepts
-  throw ConfigError(task.path + ": " + error.what());
+  throw ConfigError("{}: {}", task.path, error.what());
 }
 
 int ImportFromFleet(FleetImportArguments options) {
@@ -57,7 +57,7 @@ int ImportFromFleet(FleetImportArguments options) {
     std::cout << JsonText(ToJson(tables)) << std::endl;
   } else {
     std::cout << ToText(tables) << "import: " << count << " transitions of " << task.period << " s"
-              << (is_written ? " in " + Printable(options.out) : "");
+              << (is_written ? fmt::format(" in {}", Printable(options.out)) : "");
     if (count > 0)
       std::cout << fmt::format("\nSteps lasted up to {:g} s longer or shorter: {}", found.longer,
                                !found.transitions.longer.isZero(0)

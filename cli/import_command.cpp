@@ -1,15 +1,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iomanip>
 #include <iostream>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <stdexcept>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
@@ -48,7 +45,7 @@ struct ImportArguments {
 // ---- NAME=VALUE options
 
 [[noreturn]] void Refuse(const std::string& option, const std::string& what) {
-  throw ConfigError("--" + option + ": " + what);
+  throw ConfigError("--{}: {}", option, what);
 }
 
 // The values by names that the model has. @throws ConfigError for another name, one that is given twice, or no '='.
@@ -58,10 +55,10 @@ std::map<std::string, std::string> Assignments(const std::string& option, const 
   for (const std::string& text : texts) {
     const std::size_t at = text.find('=');
     const std::string name = text.substr(0, at);
-    if (at == std::string::npos) Refuse(option, "'" + text + "' is not NAME=VALUE");
+    if (at == std::string::npos) Refuse(option, fmt::format("'{}' is not NAME=VALUE", text));
     if (std::ranges::find(known, name) == known.end())
-      Refuse(option, "the model has no '" + name + "'; " + Suggestion(name, known));
-    if (!values.emplace(name, text.substr(at + 1)).second) Refuse(option, name + " is given twice");
+      Refuse(option, fmt::format("the model has no '{}'; {}", name, Suggestion(name, known)));
+    if (!values.emplace(name, text.substr(at + 1)).second) Refuse(option, fmt::format("{} is given twice", name));
   }
   return values;
 }
@@ -94,7 +91,8 @@ std::vector<std::pair<int, int>> HeldOf(const ImportArguments& options, const No
   const auto &states = model.state_names(), &inputs = model.input_names();
   for (const auto& [state, input] : Assignments("held", options.held, states)) {
     const auto at = std::ranges::find(inputs, input);
-    if (at == inputs.end()) Refuse("held", "the model has no input '" + input + "'; " + Suggestion(input, inputs));
+    if (at == inputs.end())
+      Refuse("held", fmt::format("the model has no input '{}'; {}", input, Suggestion(input, inputs)));
     held.emplace_back(std::ranges::find(states, state) - states.begin(), at - inputs.begin());
   }
   return held;
@@ -185,7 +183,7 @@ std::vector<long double> FactorsOf(const ImportArguments& options, const Nominal
     try {
       factors[i] = FactorOf(at->second, UnitOf(model, i));
     } catch (const std::invalid_argument& error) {
-      Refuse("unit", names[i] + "=" + error.what());
+      Refuse("unit", fmt::format("{}={}", names[i], error.what()));
     }
   }
   return factors;
@@ -196,7 +194,8 @@ Eigen::VectorXd InputTolerances(const ImportArguments& options, const NominalMod
   Eigen::VectorXd tolerances = Eigen::VectorXd::Zero(model.num_inputs());
   for (const auto& [name, text] : Assignments("input-tolerance", options.input_tolerances, names)) {
     const auto [value, problem] = ParseNumber(text);
-    if (!problem.empty() || value < 0) Refuse("input-tolerance", name + ": '" + text + "' is no number from 0 up");
+    if (!problem.empty() || value < 0)
+      Refuse("input-tolerance", fmt::format("{}: '{}' is no number from 0 up", name, text));
     tolerances[std::ranges::find(names, name) - names.begin()] = value;
   }
   return tolerances;
@@ -207,9 +206,10 @@ ImportOptions ImportOptionsOf(const ImportArguments& options, const Config& conf
   ImportOptions import;
   import.period = config.period;
   import.tolerance = options.tolerance_ms / 1000;
+  // Beyond that, the row for t + dt could be nearer to another step.
   if (!(import.tolerance < config.period / 2))
-    Refuse("tolerance-ms", ToText(options.tolerance_ms) + " has to be below half a step of the task, " +
-                               ToText(config.period * 500) + " ms");
+    Refuse("tolerance-ms", fmt::format("{} has to be below half a step of the task, {} ms",
+                                       ToText(options.tolerance_ms), ToText(config.period * 500)));
   try {
     import.time_unit = options.rate ? 0 : FactorOf(options.time_unit, "s");
   } catch (const std::invalid_argument& error) {
@@ -225,7 +225,7 @@ ImportOptions ImportOptionsOf(const ImportArguments& options, const Config& conf
   for (const std::string& name : options.unwrapped) {
     const auto at = std::ranges::find(model.state_names(), name);
     if (at == model.state_names().end())
-      Refuse("unwrap", "the model has no state '" + name + "'; " + Suggestion(name, model.state_names()));
+      Refuse("unwrap", fmt::format("the model has no state '{}'; {}", name, Suggestion(name, model.state_names())));
     import.unwrapped.push_back(static_cast<int>(at - model.state_names().begin()));
   }
   import.from = options.from.value_or(-kInfinity);
@@ -273,14 +273,11 @@ Json ToJson(const Source& source, const std::vector<std::string>& columns) {
 }
 
 std::string Line(const Finding& finding, const std::string& what) {
-  std::ostringstream text;
-  text << "  " << std::right << std::setw(9) << finding.count << "  " << what << "; first in line "
-       << finding.first_line;
-  if (!finding.first.empty()) text << " (" << Printable(finding.first) << ")";
-  return text.str() + "\n";
+  return fmt::format("  {:>9}  {}; first in line {}{}\n", finding.count, what, finding.first_line,
+                     finding.first.empty() ? "" : fmt::format(" ({})", Printable(finding.first)));
 }
 
-std::string Milliseconds(double seconds) { return RoundedUp(seconds * 1000, 3) + " ms"; }
+std::string Milliseconds(double seconds) { return fmt::format("{} ms", RoundedUp(seconds * 1000, 3)); }
 
 // How far the nearest stamps are, for the starts that have none near enough.
 void PrintGaps(const ImportedLog& log, const ImportArguments& options) {
@@ -298,7 +295,7 @@ void PrintForPeople(const Source& source, const std::vector<std::string>& column
   for (std::size_t j = 0; j < columns.size(); ++j)
     if (const Finding& finding = table.not_a_number[j]; finding.count > 0)
       std::cout << Line({finding.count, finding.first_line, "'" + finding.first + "'"},
-                        "fields of '" + columns[j] + "' that are no number");
+                        fmt::format("fields of '{}' that are no number", columns[j]));
   if (const Finding& commas = table.decimal_commas; commas.count > 0)
     std::cout << Line({commas.count, commas.first_line, "'" + commas.first + "'"},
                       "numbers with a decimal comma: give --decimal comma");
@@ -314,7 +311,7 @@ void PrintForPeople(const Source& source, const std::vector<std::string>& column
 std::string Listed(const std::vector<std::string>& names, const Eigen::VectorXd& values) {
   return Joined(names, [&](const std::string& name) {
     const double value = values[&name - names.data()];
-    return value > 0 ? name + " " + RoundedUp(value, 3) : "";
+    return value > 0 ? fmt::format("{} {}", name, RoundedUp(value, 3)) : "";
   });
 }
 
@@ -360,6 +357,7 @@ Share ShareOf(const std::vector<Source>& sources) {
     share.used += source.log.rows_used;
     share.gap = std::max(share.gap, source.log.median_gap);
     for (std::size_t cause = 0; cause < counts.size(); ++cause)
+      // A reason that nothing helps against is not named.
       if (*WordsOf(static_cast<Dropped>(cause)).remedy != '\0') counts[cause] += source.log.dropped[cause].count;
   }
   // Of rows whose stamps go backwards, each is a piece that ends at once.
@@ -377,7 +375,7 @@ void PrintShare(const Share& share, double period) {
   std::cout << fmt::format(
       "import: {} of {} rows ({:.3g} %) are in no transition; the most frequent reason: {} ({})\n", dropped, share.rows,
       100.0 * static_cast<double>(dropped) / static_cast<double>(share.rows), WordsOf(share.main_cause).line,
-      tolerable ? "--tolerance-ms " + RoundedUp(share.gap * 1000, 3) + " takes half of these starts"
+      tolerable ? fmt::format("--tolerance-ms {} takes half of these starts", RoundedUp(share.gap * 1000, 3))
                 : WordsOf(share.main_cause).remedy);
 }
 
@@ -408,7 +406,7 @@ std::string Sentence(const CommandDelay& delay) {
   if (delay.error.empty() || (delay.least == 0 && delay.largest + 1 == std::ssize(delay.error)))
     return "how late commands act cannot be told: the inputs vary too little, or the model is off by more than they do";
   if (delay.IsKnown())
-    return delay.best == 0 ? "commands act at once" : "commands act " + NumberOfRows(delay.best) + " late";
+    return delay.best == 0 ? "commands act at once" : fmt::format("commands act {} late", NumberOfRows(delay.best));
   return fmt::format("commands act {} to {} late: which of them cannot be told", delay.least,
                      NumberOfRows(delay.largest));
 }
@@ -440,11 +438,11 @@ int ShiftBy(const ImportArguments& options, const std::optional<CommandDelay>& d
     const auto [value, problem] = ParseNumber(options.command_delay);
     if (options.command_delay != "none" &&
         (!problem.empty() || !(value >= 0 && value <= 1e6) || std::floor(value) != value))
-      Refuse("command-delay", "'" + options.command_delay + "' is no whole number of rows, nor auto");
+      Refuse("command-delay", fmt::format("'{}' is no whole number of rows, nor auto", options.command_delay));
     return options.command_delay == "none" ? 0 : static_cast<int>(value);
   }
   if (options.command_delay != "auto") return 0;
-  if (!delay->IsKnown()) Refuse("command-delay", "auto: " + Sentence(*delay) + "; give a number of rows");
+  if (!delay->IsKnown()) Refuse("command-delay", fmt::format("auto: {}; give a number of rows", Sentence(*delay)));
   return delay->best;
 }
 
@@ -462,8 +460,8 @@ void FindTime(ImportArguments& options) {
   std::vector<std::string> columns;
   if (!has_time) columns = LogColumns(options.logs.front(), FormatOf(options));
   if (std::ranges::find(columns, kUsual) == columns.end())
-    throw ConfigError("give either --time, the column of the stamps, or --rate, the rows in a second" +
-                      (columns.empty() ? "" : "; the columns are " + Joined(columns)));
+    throw ConfigError("give either --time, the column of the stamps, or --rate, the rows in a second{}",
+                      columns.empty() ? "" : fmt::format("; the columns are {}", Joined(columns)));
   options.time = kUsual;
 }
 
@@ -525,7 +523,8 @@ int RunImport(ImportArguments options) {
     if (import.command_delay > 0)
       std::cout << "Each command counts " << NumberOfRows(import.command_delay) << " later.\n";
     std::cout << "import: " << all.size() << " transitions of " << ToText(config.period) << " s"
-              << (writes ? " in " + options.out : "; " + options.out + " is not written") << std::endl;
+              << (writes ? fmt::format(" in {}", options.out) : fmt::format("; {} is not written", options.out))
+              << std::endl;
     PrintShare(share, config.period);
   }
   if (all.size() > 0 && !writes)
@@ -540,14 +539,14 @@ Command ImportCommand() {
   const auto options = std::make_shared<ImportArguments>();
   return {
       .name = "import",
-      .footer =
+      .footer = fmt::format(
           "A transition is (state at t, input held from t to t + dt, state at t + dt), with dt and the names of the "
           "task's model.\n"
           "A row's input holds until the next row. No state is interpolated, and no transition spans a lost row.\n"
-          "docs/data.md says what else counts, and what of it is an error that the declaration has to allow for.\n\n"
-          "Units beside those of the model: " +
-          Joined(KnownUnits(), [](const Unit& unit) { return unit.name; }) +
-          ".\n\n"
+          "docs/data.md says what else counts, and what of it is an error that the declaration has to allow for.\n"
+          "\n"
+          "Units beside those of the model: {}.\n"
+          "\n"
           "Examples:\n"
           "  forereach import --config my_robot.yaml --time stamp --out transitions.csv log.csv\n"
           "  forereach import --config my_robot.yaml --time 'mocap time' --time-unit ms --tolerance-ms 2 \\\n"
@@ -555,6 +554,7 @@ Command ImportCommand() {
           "    --input a=cmd.accel --input-mean --out transitions.csv monday.csv tuesday.csv\n"
           "  forereach import --config my_robot.yaml --state x=/odom.pose.pose.position.x \\\n"
           "    --state v=/odom.twist.twist.linear.x --input u=/cmd_vel.linear.x --out transitions.csv run.mcap",
+          Joined(KnownUnits(), [](const Unit& unit) { return unit.name; })),
       .options =
           {ConfigOption(options->config, "Task file (YAML): its model, dt and domain; its transitions are not read"),
            Required({"--out", &options->out, "FILE.csv", "The transitions, for the key `transitions`"}),

@@ -5,7 +5,6 @@
 #include <optional>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
@@ -33,7 +32,7 @@ struct ImportWorldArguments {
 };
 
 [[noreturn]] void RefuseOption(const std::string& option, const std::string& what) {
-  throw ConfigError("--" + option + ": " + what);
+  throw ConfigError("--{}: {}", option, what);
 }
 
 std::string FormatOf(const ImportWorldArguments& options) {
@@ -43,18 +42,20 @@ std::string FormatOf(const ImportWorldArguments& options) {
   if (extension == ".xml") return "commonroad";
   if (extension == ".json" || extension == ".geojson") return "geojson";
   const bool is_image = extension == ".pgm" || extension == ".png";
-  throw ConfigError(options.file + (is_image ? ": is an image; name the YAML file of the map, which says where it is"
-                                             : ": its name does not say what it is; give --format"));
+  throw ConfigError("{}: {}", options.file,
+                    is_image ? "is an image; name the YAML file of the map, which says where it is"
+                             : "its name does not say what it is; give --format");
 }
 
 // "1,2" as so many numbers.
 std::vector<double> NumbersOf(const std::string& option, const std::string& text, std::size_t count) {
   std::vector<double> numbers;
+  // Up to the end itself, so that a comma there is followed by an empty number, which is refused.
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
     const std::string word = text.substr(begin, end - begin);
     const auto [value, problem] = ParseNumber(word);
-    if (!problem.empty()) RefuseOption(option, "'" + word + "' " + std::string(problem));
+    if (!problem.empty()) RefuseOption(option, fmt::format("'{}' {}", word, problem));
     numbers.push_back(value);
     begin = end + 1;
   }
@@ -93,6 +94,7 @@ std::string TextOf(const ImportWorldArguments& options, const World& world) {
 
 int RunImportWorld(const ImportWorldArguments& options) {
   const std::string format = FormatOf(options);
+  // Before the reading, which may take long.
   RequireNewFile(options.out, options.force);
   if (options.whole_task && options.task.empty()) RefuseOption("whole-task", "needs --task");
   const std::optional<Box> region = RegionOfOptions(options);
@@ -100,6 +102,7 @@ int RunImportWorld(const ImportWorldArguments& options) {
   const std::size_t all = world.pieces.size();
   if (region) world = Cropped(std::move(world), *region);
   const std::size_t count = world.pieces.size();
+  // All or nothing: a part of the obstacles would be a world with holes.
   const bool fits = count <= kMostObstacles;
   if (fits) WriteNewFile(options.out, TextOf(options, world), options.force);
   if (options.json) {

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "cli/commands.h"
 #include "forereach/dynamics/expression.h"
 #include "forereach/numerics/limits.h"
@@ -35,8 +37,7 @@ bool IsNullOfYaml(const std::string& name) { return name == "null" || name == "N
 // A path stands in comments and texts of the task.
 void RequireOneLine(const char* option, const std::string& path) {
   if (std::ranges::any_of(path, [](unsigned char c) { return std::iscntrl(c) != 0; }))
-    throw ConfigError(std::string(option) +
-                      ": the path has a control character, as a line break, which no task file can name");
+    throw ConfigError("{}: the path has a control character, as a line break, which no task file can name", option);
 }
 
 struct InitArguments {
@@ -62,7 +63,7 @@ std::string CommentOf(const std::string& file, const std::string& name) {
 
 std::string ValueOf(const ModelText::Parameter& parameter) {
   return parameter.lower == parameter.upper ? ToText(parameter.lower)
-                                            : "[" + ToText(parameter.lower) + ", " + ToText(parameter.upper) + "]";
+                                            : fmt::format("[{}, {}]", ToText(parameter.lower), ToText(parameter.upper));
 }
 
 // An angle that is reported in [-pi, pi] turns on in a plan.
@@ -141,22 +142,19 @@ TaskTemplate FromModel(const InitArguments& options) {
     task.states.push_back(PlaceholderRange(state, std::ranges::find(text.angles, state.name) != text.angles.end()));
   for (const ModelText::Variable& input : text.inputs) task.inputs.push_back(PlaceholderRange(input, false));
   task.center.assign(text.states.size(), 0);
-  task.model =
+  task.model = fmt::format(
       "# The nominal model: the equations of a file that comes with ForeReach, with the parameters of your robot. To "
       "change\n"
-      "# the equations, copy " +
-      path +
-      " and name your copy.\n"
+      "# the equations, copy {} and name your copy.\n"
       "model:\n"
-      "  file: " +
-      YamlText(name) +
-      "\n"
-      "  parameters:\n";
+      "  file: {}\n"
+      "  parameters:\n",
+      path, YamlText(name));
   for (const ModelText::Parameter& parameter : text.parameters) {
     const bool is_given = parameter.name == "dt" && options.dt;
-    task.model += "    " + parameter.name + ": " + (is_given ? ToText(*options.dt) : ValueOf(parameter)) +
-                  (parameter.name == "dt" ? "  # s, from one control to the next" : CommentOf(file, parameter.name)) +
-                  "\n";
+    task.model +=
+        fmt::format("    {}: {}{}\n", parameter.name, is_given ? ToText(*options.dt) : ValueOf(parameter),
+                    parameter.name == "dt" ? "  # s, from one control to the next" : CommentOf(file, parameter.name));
   }
   if (!text.angles.empty()) {
     task.model += "  # Values that differ by 2 pi are the same, in the data and of the measured state.\n  angles: [";
@@ -168,7 +166,7 @@ TaskTemplate FromModel(const InitArguments& options) {
     KeepFromZero(*drive, task);
   }
   task.transitions = fs::path(options.out).stem().string() + "_steps.csv";
-  task.command = "forereach init --model " + options.model;
+  task.command = fmt::format("forereach init --model {}", options.model);
   return task;
 }
 
@@ -179,8 +177,7 @@ struct Header {
 
 void RequireCount(const std::string& path, const char* what, const std::vector<std::string>& names, int most) {
   if (names.size() > static_cast<std::size_t>(most))
-    throw ConfigError(path + ":1: " + std::to_string(names.size()) + " " + what + " are outside [0, " +
-                      std::to_string(most) + "]");
+    throw ConfigError("{}:1: {} {} are outside [0, {}]", path, names.size(), what, most);
 }
 
 Header ReadHeader(const std::string& path) {
@@ -188,26 +185,28 @@ Header ReadHeader(const std::string& path) {
   Header header;
   for (const std::string& column : columns) {
     if (column.ends_with(kNextEnding)) continue;
+    // The columns become names of the task's expressions.
     if (!IsName(column) || IsReserved(column) || column == "dt" || IsNullOfYaml(column) || column.size() > kLongestName)
       throw ConfigError(
-          path + ":1: '" + column.substr(0, kLongestName) +
-          "' cannot be the name of a state or an input: that is a letter, then letters, digits and underscores, " +
-          std::to_string(kLongestName) + " at most, and no function, pi, dt or null; rename the column");
+          "{}:1: '{}' cannot be the name of a state or an input: that is a letter, then letters, digits "
+          "and underscores, {} at most, and no function, pi, dt or null; rename the column",
+          path, column.substr(0, kLongestName), kLongestName);
     const bool is_state = std::ranges::find(columns, column + kNextEnding) != columns.end();
     (is_state ? header.states : header.inputs).push_back(column);
   }
   for (const std::string& column : columns)
     if (const std::string name = column.substr(0, column.size() - std::min<std::size_t>(column.size(), 5));
         column.ends_with(kNextEnding) && std::ranges::find(header.states, name) == header.states.end())
-      throw ConfigError(path + ":1: " + column + " is the state after a step, and there is no column " + name +
-                        " with the state before it");
+      throw ConfigError("{}:1: {} is the state after a step, and there is no column {} with the state before it", path,
+                        column, name);
   if (header.states.empty())
-    throw ConfigError(path +
-                      ":1: no column is a state: a state x has the columns x, before a step, and x_next, after it. A "
-                      "log of states and inputs over time is made into such a file first");
+    throw ConfigError(
+        "{}:1: no column is a state: a state x has the columns x, before a step, and x_next, after it. A "
+        "log of states and inputs over time is made into such a file first",
+        path);
   RequireCount(path, "states", header.states, kMaxStates);
   if (header.inputs.empty())
-    throw ConfigError(path + ":1: no column is an input: every column has one with _next, and a model needs an input");
+    throw ConfigError("{}:1: no column is an input: every column has one with _next, and a model needs an input", path);
   RequireCount(path, "inputs", header.inputs, kMaxInputs);
   return header;
 }
@@ -223,7 +222,7 @@ TaskTemplate FromTransitions(const InitArguments& options) {
   const auto n = header.states.size();
   for (const std::string& state : header.states) columns.push_back(state + kNextEnding);
   const Eigen::MatrixXd rows = ReadCsv(path, columns);
-  if (rows.rows() == 0) throw ConfigError(path + ":2: no transitions; at least one is needed");
+  if (rows.rows() == 0) throw ConfigError("{}:2: no transitions; at least one is needed", path);
 
   TaskTemplate task;
   for (std::size_t l = 0; l < n + header.inputs.size(); ++l) {
@@ -239,24 +238,21 @@ TaskTemplate FromTransitions(const InitArguments& options) {
       "# begins with a model of the library.\n"
       "model:\n"
       "  states:  # with their units, which are for people; 1 where you have not put one in\n";
-  for (const std::string& state : header.states) task.model += "    " + state + ": \"1\"\n";
+  for (const std::string& state : header.states) task.model += fmt::format("    {}: \"1\"\n", state);
   task.model += "  inputs:  # likewise\n";
-  for (const std::string& input : header.inputs) task.model += "    " + input + ": \"1\"\n";
-  task.model +=
+  for (const std::string& input : header.inputs) task.model += fmt::format("    {}: \"1\"\n", input);
+  task.model += fmt::format(
       "  # The states that are angles, if there are any: values that differ by 2 pi are the same.\n"
-      "  # angles: [" +
-      header.states.back() +
-      "]\n"
+      "  # angles: [{}]\n"
       "  parameters:\n"
-      "    dt: " +
-      ToText(*options.dt) +
-      "  # s, from one sample of the data to the next\n"
-      "  next:  # the state after one step, or `rate` and `integrator`. PLACEHOLDER\n";
-  for (const std::string& state : header.states) task.model += "    " + state + ": " + state + "\n";
+      "    dt: {}  # s, from one sample of the data to the next\n"
+      "  next:  # the state after one step, or `rate` and `integrator`. PLACEHOLDER\n",
+      header.states.back(), ToText(*options.dt));
+  for (const std::string& state : header.states) task.model += fmt::format("    {}: {}\n", state, state);
   const fs::path directory = fs::absolute(options.out).parent_path();
   task.transitions = fs::absolute(path).lexically_normal().lexically_proximate(directory.lexically_normal()).string();
   task.transitions_exist = true;
-  task.command = "forereach init --transitions " + path + " --dt " + ToText(*options.dt);
+  task.command = fmt::format("forereach init --transitions {} --dt {}", path, ToText(*options.dt));
   return task;
 }
 

@@ -4,7 +4,6 @@
 #include <string_view>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
@@ -29,11 +28,10 @@ struct LogArguments {
 std::string Date(std::int64_t utime) {
   const std::time_t seconds = utime / 1'000'000;
   std::tm date{};
-  char text[32], fraction[16];
+  char text[32];
   if (!::gmtime_r(&seconds, &date) || std::strftime(text, sizeof text, "%FT%T", &date) == 0)
     return std::to_string(utime);
-  std::snprintf(fraction, sizeof fraction, ".%06d", static_cast<int>(utime % 1'000'000));
-  return std::string(text) + fraction;
+  return fmt::format("{}.{:06}", text, utime % 1'000'000);
 }
 
 // Says where a log is damaged, the first times, and counts in any case.
@@ -96,15 +94,15 @@ int Write(const LogArguments& options) {
   const LogEditResult result = WriteLog(options.logs, options.selection,
                                         options.action == "merge" ? LogSequence::kByTime : LogSequence::kAsNamed,
                                         options.output, [&](const DamagedPlace& place) { report(place); });
-  return Finish(result, "log: wrote " + options.output + ": ", std::cout);
+  return Finish(result, fmt::format("log: wrote {}: ", options.output), std::cout);
 }
 
 int RunLog(LogArguments options) {
   const bool writes = options.action != "list";
   if (writes == options.output.empty())
-    throw LogError(writes ? "log " + options.action + ": name the new log with --out FILE"
+    throw LogError(writes ? fmt::format("log {}: name the new log with --out FILE", options.action)
                           : "log list: writes no --out");
-  if (writes && options.json) throw LogError("log " + options.action + ": --json is for log list");
+  if (writes && options.json) throw LogError(fmt::format("log {}: --json is for log list", options.action));
   options.selection.drops_others = options.action == "list" || options.action == "filter";
   return writes ? Write(options) : List(options);
 }

@@ -9,7 +9,6 @@
 #include <string_view>
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "bus/bus_options.h"
@@ -93,7 +92,7 @@ std::string SampleOf(const std::string& path) {
     file.read(block.data(), std::min(size, kBytes));
     digest = ChainedDigest(digest, Bytes(reinterpret_cast<const std::uint8_t*>(block.data()), block.size()));
   }
-  if (!file) throw ConfigError(path + ": cannot be read");
+  if (!file) throw ConfigError("{}: cannot be read", path);
   return fmt::format("{} {}", size, ToHex(digest));
 }
 
@@ -113,7 +112,7 @@ nlohmann::json DescribeRuns(const NamedRuns& named) {
 
 // Everything besides the runs.
 std::string JobOf(const ShardedCommand& command) {
-  std::string job = command.name + " " + command.options;
+  std::string job = fmt::format("{} {}", command.name, command.options);
   BusOptions bus;
   if (!command.config.empty()) {
     const Config task = LoadConfig(command.config);
@@ -124,6 +123,7 @@ std::string JobOf(const ShardedCommand& command) {
   job += command.key.none ? "\nno key" : "\nkey";
   if (const std::optional<KeyRing> keys = PublicKeysOf(bus)) {
     job += " " + keys->robot();
+    // With other keys, other messages count as authentic.
     for (const Role role : kAllRoles) job += " " + ToHex(DigestOf(Bytes(keys->public_key(role))));
   }
   return job;
@@ -142,7 +142,9 @@ struct ShardFile {
   [[nodiscard]] std::string Name() const { return fmt::format("shard {} of {}", number(), count()); }
 };
 
-[[noreturn]] void RefuseShard(const std::string& path, const std::string& why) { throw ConfigError(path + ": " + why); }
+[[noreturn]] void RefuseShard(const std::string& path, const std::string& why) {
+  throw ConfigError("{}: {}", path, why);
+}
 
 std::string DigestOfDocument(const nlohmann::json& document) { return ToHex(DigestOf(JsonText(document))); }
 
@@ -167,6 +169,7 @@ ShardFile ReadShard(const std::string& path) {
     file.document.erase("digest");
     if (DigestOfDocument(file.document) != digest || DigestOfRest(path) != file["pieces"])
       RefuseShard(path, "is damaged: its digest is that of other content");
+    // Results are this program's own structs: the numbers of another version may mean something else.
     if (file["program"] != DigestOfProgram()) RefuseShard(path, "another version of this program wrote it");
     if (file.number() < 1 || file.number() > file.count() || file.count() > kMostShards ||
         file["results"].size() != file["runs"].size() ||
@@ -174,13 +177,15 @@ ShardFile ReadShard(const std::string& path) {
       RefuseShard(path, "no shard is such");
     return file;
   } catch (const nlohmann::json::exception& error) {
-    RefuseShard(path, std::string("not the file of a shard: it ") + DescribeJsonError(error));
+    RefuseShard(path, fmt::format("not the file of a shard: it {}", DescribeJsonError(error)));
   }
 }
 
 // Whether two files are of one command.
 void RequireTogether(const ShardFile& first, const ShardFile& file) {
-  const auto refuse = [&](const std::string& how) { RefuseShard(file.path, how + " than " + first.path); };
+  const auto refuse = [&](const std::string& how) {
+    RefuseShard(file.path, fmt::format("{} than {}", how, first.path));
+  };
   if (file["command"] != first["command"]) refuse("is of another command");
   if (file["job"] != first["job"] || file["config"] != first["config"] || file["options"] != first["options"])
     refuse("was made with another task, key or option");
@@ -217,8 +222,9 @@ int Merge(const MergeArguments& options) try {
   const Shards shards(options.files);
   const bool is_export = shards.name() == "export";
   if (is_export == options.out.empty())
-    throw ConfigError(is_export ? "--out: is needed, since these are the shards of an export"
-                                : "--out: is for the shards of an export, and these are of " + shards.name());
+    throw ConfigError(is_export
+                          ? "--out: is needed, since these are the shards of an export"
+                          : fmt::format("--out: is for the shards of an export, and these are of {}", shards.name()));
   if (is_export) return WriteMergedExport(shards, options.out);
   return kMerged.at(shards.name())(shards, options.json);
 } catch (const nlohmann::json::exception&) {
@@ -238,7 +244,7 @@ void ShardOptions::AddTo(std::vector<Option>& options) {
 Shard ShardOptions::Get() const {
   const Shard chosen = ShardOf(shard);
   if (is_given() && std::filesystem::exists(out) && ReadBeginning(out, kBeginning.size()) != kBeginning)
-    throw OutputError(out + ": is not the file of a shard, and is not replaced");
+    throw OutputError(fmt::format("{}: is not the file of a shard, and is not replaced", out));
   return chosen;
 }
 
@@ -251,7 +257,8 @@ int WriteShard(const ShardOptions& options, const ShardedCommand& command, const
       {"options", command.arguments}, {"is_many", named.is_many}, {"missing", named.missing},
       {"runs", DescribeRuns(named)},  {"results", results},       {"pieces", DigestOfRest(command.pieces)}};
   if (ParseJson(JsonText(document)) != document)
-    throw OutputError(options.out + ": a name or text of the result is not UTF-8, which this file cannot hold");
+    throw OutputError(
+        fmt::format("{}: a name or text of the result is not UTF-8, which this file cannot hold", options.out));
   document["digest"] = DigestOfDocument(document);
   OutputFile file(options.out, OutputFile::Existing::kReplaced);
   file.Write(JsonText(document) + "\n");
@@ -299,7 +306,8 @@ void Shards::RequireSameRuns(const NamedRuns& found) const {
 }
 
 void Shards::RefuseRun(const std::string& file, std::size_t run) const {
-  RefuseShard(file, "found other cases or messages in " + NameOf(named_.runs[run]) + " than " + results_.front().file);
+  RefuseShard(file, fmt::format("found other cases or messages in {} than {}", NameOf(named_.runs[run]),
+                                results_.front().file));
 }
 
 Command MergeCommand() {

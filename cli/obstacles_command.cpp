@@ -43,7 +43,7 @@ class ObstaclesNode final : public Node {
   void Reload() override try {
     const Config config = LoadConfig(path_, TransitionsFile::kIgnore);
     const std::string why = WhyKeyCannotChange(channels_, config.bus, Role::kPerception);
-    if (!why.empty()) throw ConfigError(path_ + ": " + why);
+    if (!why.empty()) throw ConfigError("{}: {}", path_, why);
     RequireSendable(config);
     obstacles_ = config.obstacles;
     logging::Info("the obstacles of {} from now on", path_);

@@ -1,7 +1,8 @@
 #include <cstdint>
 #include <iostream>
 #include <limits>
-#include <sstream>
+
+#include <fmt/core.h>
 
 #include "advise/task_check.h"
 #include "cli/commands.h"
@@ -29,17 +30,16 @@ std::string Quoted(const std::string& word) {
 }
 
 std::string PositionText(const Eigen::VectorXd& position) {
-  std::ostringstream text;
-  text.precision(4);
-  for (Eigen::Index k = 0; k < position.size(); ++k) text << (k == 0 ? "(" : ", ") << position(k);
-  return text.str() + ")";
+  std::string text;
+  for (Eigen::Index k = 0; k < position.size(); ++k) text += fmt::format("{}{:.4g}", k == 0 ? "(" : ", ", position(k));
+  return text + ")";
 }
 
 // What keeps every plan from being certified, by the examination of the task.
 std::string FindingsOf(const PlanArguments& options) {
   std::string text;
   for (const TaskFinding& finding : CheckTask({options.config, "", 0}).findings)
-    if (!finding.is_remark) text += "\n" + finding.place + finding.what + "\n    " + finding.advice;
+    if (!finding.is_remark) text += fmt::format("\n{}{}\n    {}", finding.place, finding.what, finding.advice);
   return text;
 }
 

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
@@ -42,7 +43,7 @@ Config OtherTask(const ReplayArguments& options) {
 // Lines about a run, with its robot's name if there are several runs.
 void NameRobot(const NamedRuns& named, const RunLogs& run, std::vector<std::string>& lines) {
   if (!named.is_many) return;
-  for (std::string& line : lines) line = run.robot + ": " + line;
+  for (std::string& line : lines) line = fmt::format("{}: {}", run.robot, line);
 }
 
 void PrintMissing(const NamedRuns& named) {
@@ -86,6 +87,7 @@ int PrintReplay(ResultsOfRuns<ReplayResult> results, const NamedRuns& named, boo
     sum += std::move(of_run);
   }
   json ? PrintJson(sum, named) : PrintForPeople(sum, named);
+  // A log without candidates agrees with everything, and shows nothing.
   return sum.differences.empty() && sum.corruptions == 0 && sum.candidates > 0 && named.missing.empty() ? 0 : 1;
 }
 
@@ -120,9 +122,9 @@ int RunReplay(const ReplayArguments& options) {
 using ByRobot = std::map<std::string, Comparison>;
 
 std::string Describe(const WhyNot& why) {
-  std::string text = std::string(OutcomeName(why.outcome)) + ", " + std::string(CauseName(why.cause));
-  if (why.obstacle >= 0) text += ", obstacle " + std::to_string(why.obstacle);
-  if (why.step >= 0) text += ", step " + std::to_string(why.step);
+  std::string text = fmt::format("{}, {}", OutcomeName(why.outcome), CauseName(why.cause));
+  if (why.obstacle >= 0) text += fmt::format(", obstacle {}", why.obstacle);
+  if (why.step >= 0) text += fmt::format(", step {}", why.step);
   return text;
 }
 
@@ -136,10 +138,9 @@ std::vector<std::pair<Key, std::int64_t>> ByCount(const std::map<Key, std::int64
 
 std::string GainsAndLosses(const Comparison& compared) {
   const std::int64_t lost = compared.num_lost();
-  return std::to_string(compared.num_gained()) + " of " + std::to_string(compared.candidates - compared.certificates) +
-         " abstentions and rejections would have been certificates, " +
-         (lost == 0 ? "and none" : "and " + std::to_string(lost)) + " of the " + std::to_string(compared.certificates) +
-         " certificates lost";
+  return fmt::format("{} of {} abstentions and rejections would have been certificates, {} of the {} certificates lost",
+                     compared.num_gained(), compared.candidates - compared.certificates,
+                     lost == 0 ? "and none" : fmt::format("and {}", lost), compared.certificates);
 }
 
 // The JSON has all.

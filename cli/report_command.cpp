@@ -5,6 +5,8 @@
 #include <mutex>
 #include <optional>
 
+#include <fmt/core.h>
+
 #include "cli/abstention_advice.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
@@ -145,7 +147,7 @@ Command ReportCommand() {
           "  forereach report run/log --before old/log/decisions.sqlite --out both.html\n"
           "  forereach report --database postgresql://fleet.example/forereach --out fleet.html",
       .options = {Required({"logs", &report.logs, "LOG|DATABASE|DIRECTORY",
-                            std::string(kLogs) + "; with --out also databases, directories and logs of several runs"}),
+                            fmt::format("{}; with --out also databases, directories and logs of several runs", kLogs)}),
                   {"--config", &report.config, "FILE", kTaskOfLogs},
                   Excluding(
                       "--out",

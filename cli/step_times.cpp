@@ -18,7 +18,7 @@ bool IsTime(std::int64_t utime) { return -kLatest <= utime && utime <= kLatest; 
 // To tenths, up.
 double MillisecondsUp(double us) { return std::ceil(us / 100) / 10; }
 
-std::string Milliseconds(std::int64_t us) { return ToText(static_cast<double>(us) / 1e3) + " ms"; }
+std::string Milliseconds(std::int64_t us) { return fmt::format("{} ms", ToText(static_cast<double>(us) / 1e3)); }
 
 }  // namespace
 

@@ -1,9 +1,9 @@
 #include <iostream>
 #include <map>
 #include <memory>
-#include <sstream>
 #include <utility>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
@@ -50,27 +50,25 @@ void RequireAcceptable(const Config& config) {
   try {
     const Certifier certifier(config.problem);
   } catch (const std::invalid_argument& error) {
-    throw ConfigError(config.path + ": " + error.what());
+    throw ConfigError("{}: {}", config.path, error.what());
   }
 }
 
 std::string DescribeVerdict(const RecordedCertificate& recorded, const Verdict& verdict) {
-  std::ostringstream text;
-  text << (verdict.status == Status::kRefuted ? "refuted: " : "cannot verify: ") << Printable(recorded.name) << "\n";
+  const bool is_refuted = verdict.status == Status::kRefuted;
+  const auto both = [](const std::string& expected, const std::string& found) {
+    return fmt::format("    expected {}\n    found    {}\n", expected, found);
+  };
+  std::string text = fmt::format("{}: {}\n", is_refuted ? "refuted" : "cannot verify", Printable(recorded.name));
   for (const Mismatch& mismatch : recorded.mismatches)
-    text << "  " << mismatch.what << "\n    expected " << mismatch.expected << "\n    found    " << mismatch.found
-         << "\n";
+    text += fmt::format("  {}\n{}", mismatch.what, both(mismatch.expected, mismatch.found));
   const verifier::Failure& failure = verdict.failure;
-  if (failure.what.empty()) {
-    text << "  every step of its mathematics holds for the inputs given\n";
-    return text.str();
-  }
-  text << "  ";
-  if (failure.step >= 0) text << "step " << failure.step << ": ";
-  text << (verdict.status == Status::kRefuted ? "not so: " : "") << failure.what << "\n";
-  if (!failure.bound.empty()) text << "    expected " << failure.bound << "\n    found    " << failure.found << "\n";
-  if (failure.excess < 1e-12) text << "    which is off by " << failure.excess << " of its size\n";
-  return text.str();
+  if (failure.what.empty()) return text + "  every step of its mathematics holds for the inputs given\n";
+  text += fmt::format("  {}{}{}\n", failure.step >= 0 ? fmt::format("step {}: ", failure.step) : "",
+                      is_refuted ? "not so: " : "", failure.what);
+  if (!failure.bound.empty()) text += both(failure.bound, failure.found);
+  if (failure.excess < 1e-12) text += fmt::format("    which is off by {:g} of its size\n", failure.excess);
+  return text;
 }
 
 nlohmann::json ToJson(const RecordedCertificate& recorded, const Verdict& verdict) {
@@ -241,7 +239,7 @@ Verified SumOf(ResultsOfRuns<Verified> results) {
 
 int VerifyDecision(const VerifyArguments& options) {
   const std::string& file = options.files[0];
-  if (options.shard.is_given()) throw ConfigError(file + ": --shard divides logs, and this is a single decision");
+  if (options.shard.is_given()) throw ConfigError("{}: --shard divides logs, and this is a single decision", file);
   Verifying verifying(options.jobs, nullptr, {});
   Verified sum = verifying.Finish(ReadCertificates(file, options.config, options.key, verifying)).Sum();
   sum.of_decision = true;
@@ -286,7 +284,7 @@ Command VerifyCommand() {
           "  forereach verify run/log\n"
           "  forereach verify run/log --shard 2/7 --out part2.json",
       .options = {Required({"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
-                            std::string("The certificates: a decision (the output of certify --json), or ") + kRuns}),
+                            fmt::format("The certificates: a decision (the output of certify --json), or {}", kRuns)}),
                   {"--config", &options->config, "FILE", kTaskOfRecords},
                   JsonFlag(options->json)},
       .run = [options] { return Verify(*options); }};
