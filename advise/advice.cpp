@@ -674,8 +674,7 @@ const char* Name(ChangeKind kind) {
 std::string DescribePlace(const Problem& problem, const Eigen::VectorXd& z) {
   std::string text;
   for (Eigen::Index l = 0; l < z.size(); ++l)
-    if ((problem.declaration.lipschitz.col(l).array() != 0).any() ||
-        std::ranges::count(problem.declaration.affine.columns, static_cast<int>(l)) > 0)
+    if ((problem.declaration.lipschitz.col(l).array() != 0).any() || problem.declaration.affine.DependsOn(l))
       text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", VariableName(*problem.model, static_cast<int>(l)),
                           RoundedDown(z[l], 4));
   return text.empty() ? "any place" : text;

@@ -175,7 +175,7 @@ class Examination final {
     for (std::size_t l = 0; l < n; ++l) {
       const auto column = all_.z.col(static_cast<Eigen::Index>(l));
       const bool matters = (problem_.declaration.lipschitz.col(static_cast<Eigen::Index>(l)).array() > 0).any() ||
-                           std::ranges::count(problem_.declaration.affine.columns, static_cast<int>(l)) > 0;
+                           problem_.declaration.affine.DependsOn(static_cast<Eigen::Index>(l));
       result_.coordinates.push_back({names_[l], Lower(l), Upper(l), column.minCoeff(), column.maxCoeff(), matters});
     }
     KeepThoseInside();

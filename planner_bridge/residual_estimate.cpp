@@ -52,7 +52,7 @@ ResidualEstimate::ResidualEstimate(std::shared_ptr<const Problem> problem)
     residuals_.row(i) -= Eigen::Map<const Eigen::RowVectorXd>(nominal.data(), residuals_.cols());
     for (const int k : problem_->model->angles()) residuals_(i, k) = std::remainder(residuals_(i, k), kTurn);
   }
-  const auto& [rows, columns] = problem_->declaration.affine;
+  const auto& [rows, columns, rest] = problem_->declaration.affine;
   if (rows.empty() || data.size() == 0) return;
   Eigen::MatrixXd regressors(data.size(), std::ssize(columns) + 1);
   regressors << data.z(Eigen::all, columns), Eigen::VectorXd::Ones(data.size());
@@ -65,7 +65,7 @@ void ResidualEstimate::Predict(std::span<const double> z, std::span<double> next
 }
 
 double ResidualEstimate::Estimate(int k, std::span<const double> z) const {
-  const auto& [rows, columns] = problem_->declaration.affine;
+  const auto& [rows, columns, rest] = problem_->declaration.affine;
   if (const auto row = std::ranges::find(rows, k); row != rows.end() && fits_.cols() > 0) {
     const auto fit = fits_.col(row - rows.begin());
     double sum = fit[fit.size() - 1];

@@ -82,6 +82,10 @@ Digest DeclarationDigest(const NominalModel& model, const Declaration& declarati
       bytes.Count(std::ssize(*indices));
       for (const int index : *indices) bytes.Count(index);
     }
+    if (!declaration.affine.rest.isZero(0)) {
+      bytes.Text("rest");
+      bytes.Numbers(declaration.affine.rest);
+    }
   }
   if (!declaration.regions.empty()) {
     bytes.Text("regions");

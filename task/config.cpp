@@ -168,8 +168,9 @@ Config Load(Document& file, TransitionsFile transitions, const NamedFiles& inste
   auto& [config, problem, scope, transitions_path, rest, model_file] = draft;
   const NominalModel& model = *problem.model;
   for (const int k : problem.declaration.affine.rows)
-    for (const int l : problem.declaration.affine.columns)
-      if (problem.declaration.lipschitz(k, l) == 0 && problem.declaration.VariableError(l) > 0)
+    for (int l = 0; l < model.num_variables(); ++l)
+      if (problem.declaration.affine.DependsOn(k, l) && problem.declaration.lipschitz(k, l) == 0 &&
+          problem.declaration.VariableError(l) > 0)
         file.Fail("declaration.affine",
                   fmt::format("{} is known up to an error (state_error, input_error), which the unknown slope of {} "
                               "multiplies: declare a bound on that slope as declaration.lipschitz.{}.{}",

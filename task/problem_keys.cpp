@@ -179,9 +179,17 @@ void ReadAffine(const Field& at, TaskDraft& draft) {
     declaration.affine.columns.push_back(IndexOf(draft.scope.variables, name));
   std::ranges::sort(declaration.affine.rows);
   std::ranges::sort(declaration.affine.columns);
+  for (const Field& row : at.Entries("rest")) {
+    const int k = IndexOf(draft.scope.states, row.name());
+    if (!declaration.affine.Contains(k)) row.Fail("is none of declaration.affine.rows");
+    if (declaration.affine.rest.size() == 0)
+      declaration.affine.rest.setZero(std::ssize(draft.scope.states), std::ssize(draft.scope.variables));
+    for (const Field& slope : row.Entries())
+      declaration.affine.rest(k, IndexOf(draft.scope.variables, slope.name())) = slope.Number();
+  }
   for (const int k : declaration.affine.rows)
     for (int l = 0; l < std::ssize(draft.scope.variables); ++l)
-      if (declaration.lipschitz(k, l) != 0 && !std::ranges::binary_search(declaration.affine.columns, l))
+      if (declaration.lipschitz(k, l) != 0 && !declaration.affine.DependsOn(k, l))
         at["columns"].Fail(fmt::format("leaves {} out, by which declaration.lipschitz says that the affine {} changes",
                                        draft.scope.variables[ToSize(l)], draft.scope.states[ToSize(k)]));
 }
@@ -277,13 +285,22 @@ std::vector<Key> DeclarationKeys() {
                        ReadLipschitzMatrix)),
       Optional(Map("declaration.affine",
                    "Rows of the residual that are affine: r_k(z) = sum over the columns l of M_kl z_l + b_k on the "
-                   "whole domain. Data bound M and b. An entry of `lipschitz` there says that |M_kl| is at most that; "
-                   "errors of the column (`state_error`, `input_error`) count by it, and need it.",
+                   "whole domain, and `rest`. Data bound M and b. An entry of `lipschitz` there says that |M_kl| is at "
+                   "most that, and that r_k changes by no more; errors of the variable (`state_error`, `input_error`) "
+                   "count by it, and need it.",
                    ReadAffine),
                "none"),
       Required(Names("declaration.affine.rows", Between(1, kMaxStates), Size::kStates, "Their states.")),
       Required(Names("declaration.affine.columns", Between(1, AffineRows::kMaxColumns), Size::kVariables,
                      "The states and inputs that they depend on.")),
+      Optional(
+          Map("declaration.affine.rest",
+              "G by names, as declaration.lipschitz: what is left of the row beside M z + b changes by at most sum "
+              "over l of G_kl |z_l - z'_l|, of all states and inputs."),
+          "zeros"),
+      Map("declaration.affine.rest.<state>", "Row k: that of this state."),
+      Number("declaration.affine.rest.<state>.<variable>", "of the state per that of the coordinate", kNotNegative,
+             "G_kl."),
       Required(Vector("declaration.noise_bound", "of the state", kNotNegative, Size::kStates,
                       "sigma: the largest error of a recorded successor, beside its last bit and state_error.",
                       [](const Field& at, TaskDraft& draft) { draft.problem.declaration.noise_bound = at.Vector(); })),

@@ -47,23 +47,38 @@ bool AllFinite(const std::vector<Real>& numbers) {
 
 }  // namespace
 
-AffineRow::AffineRow(const Eigen::MatrixXd& z, std::vector<Real> lower, std::vector<Real> upper,
-                     std::vector<Real> sizes)
-    : rows_(z.rows(), z.cols() + 1) {
+AffineRow::AffineRow(const Eigen::MatrixXd& z, const std::vector<Real>& lower, const std::vector<Real>& upper,
+                     const std::vector<Real>& sizes, AffineRest rest)
+    : rows_(z.rows(), z.cols() + 1), rest_(std::move(rest)) {
   Eigen::Index kept = 0;
   for (Eigen::Index i = 0; i < z.rows(); ++i) {
     const auto at = ToSize(static_cast<int>(i));
     if (!lower[at].IsFinite() || !upper[at].IsFinite()) continue;
     rows_.row(kept) << z.row(i), 1;
+    if (!rest_.slopes.empty()) rest_.z.row(kept) = rest_.z.row(i).eval();
     ++kept;
-    lower_.push_back(lower[at].lower());
-    upper_.push_back(upper[at].upper());
+    given_lower_.push_back(lower[at].lower());
+    given_upper_.push_back(upper[at].upper());
     sizes_.push_back(sizes[at]);
+  }
+  rows_.conservativeResize(kept, Eigen::NoChange);
+  LookFrom(rest_.middle);
+  if (FindBasis()) DeriveSlopes();
+}
+
+void AffineRow::LookFrom(const std::vector<Real>& place) {
+  if (rest_.slopes.empty() && !lower_.empty()) return;
+  lower_.clear(), upper_.clear(), rough_lower_.clear(), rough_upper_.clear();
+  for (std::size_t i = 0; i < given_lower_.size(); ++i) {
+    Real apart;
+    for (std::size_t l = 0; l < rest_.slopes.size(); ++l)
+      apart +=
+          rest_.slopes[l] * abs(Real(rest_.z(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(l))) - place[l]);
+    lower_.push_back((given_lower_[i] - apart).lower());
+    upper_.push_back((given_upper_[i] + apart).upper());
     rough_lower_.push_back(lower_.back().ToDouble());
     rough_upper_.push_back(upper_.back().ToDouble());
   }
-  rows_.conservativeResize(kept, Eigen::NoChange);
-  if (FindBasis()) DeriveSlopes();
 }
 
 // Elimination of whole columns: of the rows that are left, the one with the largest entry in any column is next.

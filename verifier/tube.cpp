@@ -418,8 +418,9 @@ struct TubeMaker::Known {
 
 // The affine rows of the residual, for one tube. The others are null.
 struct TubeMaker::Affine {
-  const std::vector<int>& columns;
-  std::vector<std::unique_ptr<AffineRow>> rows;
+  const AffineRows& declared;
+  const std::vector<int>& columns = declared.columns;
+  std::vector<std::unique_ptr<AffineRow>> rows = {};
 
   /** The slopes of state k's residual by n states. */
   [[nodiscard]] std::vector<double> Slopes(std::size_t k, std::size_t n) const {
@@ -470,6 +471,13 @@ std::optional<Bounds> TubeMaker::Affine::Enclose(const Query& query, std::size_t
     around += rows[k]->reach()[j] * query.half_width[l];
   }
   at.emplace_back(1.0);
+  std::vector<Real> place;
+  for (std::size_t l = 0; l < query.center.size(); ++l)
+    if (const double slope = declared.Rest(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(l)); slope > 0) {
+      place.push_back(query.center[l]);
+      around += Real(slope) * query.half_width[l];
+    }
+  rows[k]->LookFrom(place);
   const std::optional<Real> upper = rows[k]->Upper(at), lower = rows[k]->Lower(at);
   if (!upper || !lower) return std::nullopt;
   return Bounds{*lower - around, *upper + around};
@@ -744,7 +752,7 @@ double TubeMaker::RemainderRounding() const {
 Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls, const TubeOptions& options) const {
   Tube tube;
   tube.slices.push_back(PieceOf(initial_set));
-  Affine affine{problem_.declaration.affine.columns, {}};
+  Affine affine{problem_.declaration.affine};
   tube.failure = MakeAffine(options.known, affine);
   for (int t = 0, steps = static_cast<int>(controls.cols()); t < steps && !tube.failure; ++t) {
     Slice slice = tube.slices.back();
@@ -824,6 +832,11 @@ std::optional<Tube> TubeMaker::Follow(const InitialSet& start, const Eigen::Matr
   return motion;
 }
 
+Failure TubeMaker::NoAffineResidual(int step, int k, bool is_visible) const {
+  return {step, "some affine residual of " + problem_.model->state_names()[ToSize(k)] + " agrees with all data", "none",
+          "", is_visible};
+}
+
 std::optional<Failure> TubeMaker::MakeAffine(const KnownRows& known, Affine& affine) const {
   const Transitions& data = problem_.transitions;
   affine.rows.resize(ToSize(problem_.model->num_states()));
@@ -832,6 +845,7 @@ std::optional<Failure> TubeMaker::MakeAffine(const KnownRows& known, Affine& aff
   for (int i = 0; i < data.size(); ++i)
     if (known.Contains(i)) kept.push_back(i);
   const Eigen::MatrixXd z = data.z(kept, affine.columns);
+  const auto [first, last] = problem_.domain.Corners();
   for (const int k : problem_.declaration.affine.rows) {
     const std::string& name = problem_.model->state_names()[ToSize(k)];
     std::vector<Real> lower, upper, sizes;
@@ -841,9 +855,18 @@ std::optional<Failure> TubeMaker::MakeAffine(const KnownRows& known, Affine& aff
       upper.push_back(seen->residual[ToSize(k)].upper);
       sizes.push_back(seen->size[ToSize(k)]);
     }
-    auto row = std::make_unique<AffineRow>(z, std::move(lower), std::move(upper), std::move(sizes));
-    if (row->IsEmpty())
-      return Failure{0, "some affine residual of " + name + " agrees with all data", "none", "", row->IsVisiblyEmpty()};
+    AffineRest rest;
+    std::vector<int> variables;
+    for (int l = 0; l < problem_.model->num_variables(); ++l)
+      if (const double slope = problem_.declaration.affine.Rest(k, l); slope > 0) {
+        variables.push_back(l);
+        rest.slopes.emplace_back(slope);
+        // As the certifier has it, in doubles: its slopes depend on it.
+        rest.middle.emplace_back(first[ToSize(l)] / 2 + last[ToSize(l)] / 2);
+      }
+    rest.z = data.z(kept, variables);
+    auto row = std::make_unique<AffineRow>(z, lower, upper, sizes, std::move(rest));
+    if (row->IsEmpty()) return NoAffineResidual(0, k, row->IsVisiblyEmpty());
     if (!row->IsBounded()) return Failure{0, "data bound the affine residual of " + name, "no bound", "", false};
     if (row->IsAmbiguous())
       return Failure{0, "the slopes of the affine residual of " + name + " are known to the last bit", "a tie", "",
@@ -873,6 +896,8 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   for (int k = 0; k < n; ++k) {
     if (query.affine.rows[ToSize(k)]) {
       const std::optional<Bounds> affine = query.affine.Enclose(query, ToSize(k));
+      const AffineRow& row = *query.affine.rows[ToSize(k)];
+      if (row.IsEmpty()) return NoAffineResidual(query.t, k, row.IsVisiblyEmpty());
       if (!affine) return no_bound("the affine residual");
       step.envelope.push_back(*affine);
       step.slopes.push_back(query.affine.Slopes(ToSize(k), ToSize(n)));

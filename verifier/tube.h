@@ -173,6 +173,7 @@ class TubeMaker final {
   [[nodiscard]] Real ScaleAt(int k, const Seen& seen) const;
   struct Plane;
   [[nodiscard]] std::shared_ptr<const Plane> PlaneOf(int k, const KnownRows& known) const;
+  [[nodiscard]] Failure NoAffineResidual(int step, int k, bool is_visible) const;
   [[nodiscard]] std::optional<Failure> MakeAffine(const KnownRows& known, Affine& affine) const;
   void AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
                    const std::vector<Real>& disturbance, const std::vector<Real>& noise,

@@ -56,7 +56,7 @@ bool Contradicts(const Contradictions::Evidence& one, const Digest& model, const
   const Observations observed = Observe(*problem.model, declaration, rows, problem.timing);
   const auto [lower, upper] = problem.domain.Corners();
   return FindViolation(declaration, observed) || FindRegionalViolation(declaration, observed, lower, upper) ||
-         FindAffineContradiction(declaration, observed) || ExceedsARate(rows, problem);
+         FindAffineContradiction(declaration, observed, lower, upper) || ExceedsARate(rows, problem);
 } catch (const std::invalid_argument&) {  // of Observe: they say nothing under this task
   return false;
 }

@@ -53,7 +53,7 @@ Json ToJson(const LatchFile::Content& content) {
 
 Eigen::MatrixXd RowsFrom(const Json& lists, std::size_t most) {
   const auto rows = lists.get<std::vector<std::vector<double>>>();
-  if (rows.empty() || rows.size() > AffineRows::kMaxColumns + 2 || rows[0].empty() || rows[0].size() > most ||
+  if (rows.empty() || rows.size() > AffineRows::kMaxColumns + 3 || rows[0].empty() || rows[0].size() > most ||
       rows[0].size() != rows.back().size())
     throw Json::other_error::create(501, "has rows that do not fit", nullptr);
   Eigen::MatrixXd matrix(std::ssize(rows), static_cast<Eigen::Index>(rows[0].size()));

@@ -16,12 +16,14 @@ std::span<const double> View(const Eigen::VectorXd& entries) { return {entries.d
 AffineRowsEnclosure::AffineRowsEnclosure(const Declaration& declaration, const Observations& observations,
                                          std::span<const double> domain_lower, std::span<const double> domain_upper,
                                          const ResidualEnclosure& others)
-    : declaration_(declaration),
-      others_(others),
-      sets_(declaration.affine.rows.size(), AffineSet(declaration.affine.columns, domain_lower, domain_upper)) {
-  for (std::size_t s = 0; s < sets_.size(); ++s)
+    : declaration_(declaration), others_(others) {
+  for (const int k : declaration_.affine.rows) {
+    Eigen::VectorXd rest;
+    if (declaration_.affine.rest.size() > 0) rest = declaration_.affine.rest.row(k);
+    AffineSet& set = sets_.emplace_back(declaration_.affine.columns, domain_lower, domain_upper, View(rest));
     for (std::size_t j = 0; j < declaration_.affine.columns.size(); ++j)
-      sets_[s].Declare(j, declaration_.lipschitz(declaration_.affine.rows[s], declaration_.affine.columns[j]));
+      set.Declare(j, declaration_.lipschitz(k, declaration_.affine.columns[j]));
+  }
   for (int i = 0; i < observations.size(); ++i) {
     const Eigen::VectorXd z = observations.z.row(i), lower = observations.lower.row(i),
                           upper = observations.upper.row(i);
@@ -69,16 +71,15 @@ void AffineRowsEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds)
   const std::vector<int>&rows = declaration_.affine.rows, &columns = declaration_.affine.columns;
   for (std::size_t k = 0; k < n && !bounds.has_slope; ++k) std::fill_n(bounds.slope[k].begin(), n, 0.0);
   bounds.has_slope = true;
-  std::array<double, AffineRows::kMaxColumns + 1> phi;
-  phi[columns.size()] = 1;
-  for (std::size_t j = 0; j < columns.size(); ++j) {
-    const auto l = ToSize(columns[j]);
-    phi[j] = l < n ? query.slice.center(columns[j]) : query.input[l - n];
-  }
+  std::array<double, kMaxVariables> z;
+  for (std::size_t l = 0; l < n; ++l) z[l] = query.slice.center(static_cast<int>(l));
+  std::ranges::copy(query.input, z.begin() + std::ptrdiff_t(n));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto k = ToSize(rows[i]);
-    const Interval middle = sets_[i].Enclose({phi.data(), columns.size() + 1});
+    const Interval middle = sets_[i].Enclose({z.data(), n + query.input.size()});
     double around = 0;
+    for (std::size_t l = 0; l < n; ++l)
+      around = AddUp(around, MulUp(declaration_.affine.Rest(rows[i], static_cast<int>(l)), query.half_width[l]));
     for (std::size_t j = 0; j < columns.size() && sets_[i].IsBounded(); ++j) {
       if (ToSize(columns[j]) >= n) continue;
       bounds.slope[k][ToSize(columns[j])] = sets_[i].slope(j);
@@ -101,13 +102,14 @@ Observations WithoutAffineRows(const Declaration& declaration, Observations obse
 }
 
 std::optional<AffineContradiction> FindAffineContradiction(const Declaration& declaration,
-                                                           const Observations& observations) {
+                                                           const Observations& observations,
+                                                           std::span<const double> domain_lower,
+                                                           std::span<const double> domain_upper) {
   if (declaration.affine.rows.empty() || observations.size() == 0) return std::nullopt;
-  const Eigen::VectorXd lower = observations.z.colwise().minCoeff(), upper = observations.z.colwise().maxCoeff();
   class Nothing final : public ResidualEnclosure {
     void Enclose(const QuerySet&, ResidualBounds&) const noexcept override {}
   } nothing;
-  return AffineRowsEnclosure(declaration, observations, View(lower), View(upper), nothing).contradiction();
+  return AffineRowsEnclosure(declaration, observations, domain_lower, domain_upper, nothing).contradiction();
 }
 
 Violation AsViolation(const AffineContradiction& contradiction) {

@@ -1,8 +1,8 @@
 /** The enclosure of a residual some of whose rows are affine (AffineRows): these by their parameters that agree with
 the observations, the others by another enclosure.
 
-Of an affine row, over a query set with center (c, u) and half-widths r,
-    r_k(z) - slope_k . (x - c)  in  [min, max of (M_k, b_k) . (c, u, 1) over A] +- sum_l max |M_kl - slope_kl| r_l.
+Of an affine row with rest G, over a query set with center (c, u) and half-widths r,
+    r_k(z) - slope_k . (x - c)  in  [bounds on r_k(c, u)] +- sum_l (max |M_kl - slope_kl| + G_kl) r_l.
 M and b are taken anew in each step: that they are the same in all of them is not used between steps. */
 #pragma once
 
@@ -53,9 +53,12 @@ class AffineRowsEnclosure final : public ResidualEnclosure {
 [[nodiscard]] Declaration WithoutAffineRows(Declaration declaration);
 [[nodiscard]] Observations WithoutAffineRows(const Declaration& declaration, Observations observations);
 
-/** Whether these observations contradict the affine rows of a declaration: a proof in real arithmetic, if any. */
+/** Whether these observations contradict the affine rows of a declaration: a proof in real arithmetic, if any. @param
+domain_lower, domain_upper as above. */
 [[nodiscard]] std::optional<AffineContradiction> FindAffineContradiction(const Declaration& declaration,
-                                                                         const Observations& observations);
+                                                                         const Observations& observations,
+                                                                         std::span<const double> domain_lower,
+                                                                         std::span<const double> domain_upper);
 
 /** As a violation, with its gap as the difference and `most` as the bound: `second` is the latest of the observations,
 `first` the one that is predicted or, if that is the latest, the most decisive of the others. */

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "forereach/numerics/size.h"
 
@@ -96,11 +97,19 @@ double Dot(std::span<const double> a, const double* b) {
 }  // namespace
 
 AffineSet::AffineSet(std::vector<int> columns, std::span<const double> domain_lower,
-                     std::span<const double> domain_upper)
+                     std::span<const double> domain_upper, std::span<const double> rest)
     : columns_(std::move(columns)), size_(columns_.size() + 1) {
   for (const int l : columns_) {
     domain_lower_.push_back(domain_lower[ToSize(l)]);
     domain_upper_.push_back(domain_upper[ToSize(l)]);
+  }
+  for (std::size_t l = 0; l < rest.size(); ++l) {
+    if (rest[l] == 0) continue;
+    middle_[rest_.size()] = domain_lower[l] / 2 + domain_upper[l] / 2;
+    rest_variables_.push_back(static_cast<int>(l));
+    rest_.push_back(rest[l]);
+    rest_lower_.push_back(domain_lower[l]);
+    rest_upper_.push_back(domain_upper[l]);
   }
 }
 
@@ -109,20 +118,63 @@ void AffineSet::Add(int id, std::span<const double> z, double lower, double uppe
   if (!(-kInfinity < lower && lower <= upper && upper < kInfinity)) return;
   for (const int l : columns_) phi_.push_back(z[ToSize(l)]);
   phi_.push_back(1);
+  for (const int l : rest_variables_) places_.push_back(z[ToSize(l)]);
   lower_.push_back(lower);
   upper_.push_back(upper);
   all_.push_back(static_cast<int>(ids_.size()));
   ids_.push_back(id);
+  if (HasRest()) seen_lower_.resize(ids_.size()), seen_upper_.resize(ids_.size());
   size_of_values_ = std::max({size_of_values_, std::abs(lower), std::abs(upper)});
 }
 
 bool AffineSet::LatestMayNarrow() const {
   if (!is_bounded_) return true;
   const auto last = ids_.size() - 1;
-  return std::ranges::any_of(vertices_, [&](const Vertex& vertex) {
-    const double value = Dot(phi(static_cast<int>(last)), vertex.theta.data());
-    return !(lower_[last] <= value && value <= upper_[last]);
-  });
+  const Place place = PlaceOf(last);
+  // With a rest, queries look at every observation: the hull, which is seen from the middle, is derived from it, and
+  // the vertices, where queries begin, now and then.
+  if (HasRest() && last > derived_ + derived_ / 4) return true;
+  for (std::size_t v = 0; v < vertices_.size(); ++v) {
+    if (HasRest() && aims_[v].from != middle_) continue;
+    const double value = Dot(phi(static_cast<int>(last)), vertices_[v].theta.data());
+    const double apart = Apart(place.data(), aims_[v].from.data());
+    if (!(lower_[last] - apart <= value && value <= upper_[last] + apart)) return true;
+  }
+  return false;
+}
+
+// At least d(a, b).
+double AffineSet::Apart(const double* a, const double* b) const noexcept {
+  if (!HasRest()) return 0;
+  double sum = 0;
+  for (std::size_t r = 0; r < rest_.size(); ++r) sum += rest_[r] * std::abs(a[r] - b[r]);
+  // Of at most kMaxVariables terms, each rounded as many times and four: below 2^-48 of them.
+  return sum * (1 + 0x1p-46) + 0x1p-1000;
+}
+
+// From the place of any query or observation.
+double AffineSet::FarthestFrom(const double* place) const {
+  Place corner{};
+  for (std::size_t r = 0; r < rest_.size(); ++r)
+    corner[r] = place[r] - rest_lower_[r] > rest_upper_[r] - place[r] ? rest_lower_[r] : rest_upper_[r];
+  return Apart(place, corner.data());
+}
+
+AffineSet::Place AffineSet::PlaceOf(std::size_t i) const {
+  Place place{};
+  for (std::size_t r = 0; r < rest_.size(); ++r) place[r] = places_[i * rest_.size() + r];
+  return place;
+}
+
+// @param lower, upper an entry for each observation; without a rest not used.
+AffineSet::Ends AffineSet::EndsFrom(const Place& from, double* lower, double* upper) const noexcept {
+  if (!HasRest()) return {lower_.data(), upper_.data()};
+  for (std::size_t i = 0; i < lower_.size(); ++i) {
+    const double apart = Apart(&places_[i * rest_.size()], from.data());
+    lower[i] = SubDown(lower_[i], apart);
+    upper[i] = AddUp(upper_[i], apart);
+  }
+  return {lower, upper};
 }
 
 // The rows that are farthest from the span of those before them, in columns that are scaled to the data's spread (a
@@ -208,7 +260,9 @@ bool AffineSet::BoundParameters(const Basis& basis) {
     most[l] = 0x1p-1000;
     for (std::size_t j = 0; j < q; ++j) {
       const auto i = ToSize(basis[j]);
-      most[l] = AddUp(most[l], MulUp(std::abs(inverse[j][l]), std::max(std::abs(lower_[i]), std::abs(upper_[i]))));
+      // As seen from wherever it may be.
+      const double size = AddUp(std::max(std::abs(lower_[i]), std::abs(upper_[i])), FarthestFrom(PlaceOf(i).data()));
+      most[l] = AddUp(most[l], MulUp(std::abs(inverse[j][l]), size));
     }
   }
   const auto next = [&](const Vector& v, std::size_t l) {
@@ -240,8 +294,8 @@ void AffineSet::Perturb(const Vector& weights, const Basis& basis, Vector& direc
   }
 }
 
-AffineSet::Climb AffineSet::Search(const Vector& direction, std::span<const int> rows, const Basis& start,
-                                   int most_steps) const noexcept {
+AffineSet::Climb AffineSet::Search(const Vector& direction, const Ends& ends, std::span<const int> rows,
+                                   const Basis& start, int most_steps) const noexcept {
   Climb found;
   found.basis = start;
   const std::size_t q = size_;
@@ -257,7 +311,7 @@ AffineSet::Climb AffineSet::Search(const Vector& direction, std::span<const int>
     Vector y{};
     for (std::size_t j = 0; j < q; ++j) {
       const auto i = ToSize(found.basis[j]);
-      y[j] = weights[j] < 0 ? lower_[i] : upper_[i];
+      y[j] = weights[j] < 0 ? ends.lower[i] : ends.upper[i];
     }
     found.theta = factors.Solve(y);
     if (step == most_steps) break;
@@ -267,8 +321,8 @@ AffineSet::Climb AffineSet::Search(const Vector& direction, std::span<const int>
       const auto i = ToSize(row);
       const double value = Dot(phi(row), found.theta.data());
       // A violation of rounding size is none: the climb would not end.
-      const double allowed = kOfWidth * (upper_[i] - lower_[i]) + kOfValue * size_of_values_;
-      const double above = value - upper_[i] - allowed, below = lower_[i] - value - allowed;
+      const double allowed = kOfWidth * (ends.upper[i] - ends.lower[i]) + kOfValue * size_of_values_;
+      const double above = value - ends.upper[i] - allowed, below = ends.lower[i] - value - allowed;
       if (!(std::max(above, below) > worst)) continue;
       if (std::find(found.basis.begin(), found.basis.begin() + std::ptrdiff_t(q), row) !=
           found.basis.begin() + std::ptrdiff_t(q))
@@ -296,7 +350,7 @@ AffineSet::Climb AffineSet::Search(const Vector& direction, std::span<const int>
   return found;
 }
 
-double AffineSet::SupportUpper(const Vector& direction, const Climb& found) const noexcept {
+double AffineSet::SupportUpper(const Vector& direction, const Ends& ends, const Climb& found) const noexcept {
   double sum = 0;
   std::array<Interval, kMostUnknowns> rest;
   std::ranges::copy(direction, rest.begin());
@@ -305,14 +359,17 @@ double AffineSet::SupportUpper(const Vector& direction, const Climb& found) cons
     const double weight = found.weights[j];
     // The rule that proves: true for any weights that are numbers, so nothing above has to be.
     if (!(std::abs(weight) < kInfinity)) return kInfinity;
-    sum = AddUp(sum, MulUp(weight, weight < 0 ? lower_[i] : upper_[i]));
+    sum = AddUp(sum, MulUp(weight, weight < 0 ? ends.lower[i] : ends.upper[i]));
     for (std::size_t l = 0; l < size_; ++l) rest[l] = rest[l] - Interval(weight) * Interval(phi(found.basis[j])[l]);
   }
   for (std::size_t l = 0; l < size_; ++l) sum = AddUp(sum, MulUp(rest[l].Magnitude(), limit_[l]));
   return sum < kInfinity ? sum : kInfinity;
 }
 
+// Where a search along this direction begins. With a rest, a vertex that was seen from elsewhere may lie far out: there
+// it is that of the direction that is most alike.
 const AffineSet::Basis& AffineSet::Nearest(const Vector& direction) const noexcept {
+  if (HasRest()) return vertices_[MostAlike(direction, aims_)].basis;
   const Vertex* nearest = vertices_.data();
   double most = -kInfinity;
   for (const Vertex& vertex : vertices_)
@@ -321,35 +378,50 @@ const AffineSet::Basis& AffineSet::Nearest(const Vector& direction) const noexce
   return nearest->basis;
 }
 
+std::size_t AffineSet::MostAlike(const Vector& direction, std::span<const Aim> aims) const noexcept {
+  std::size_t nearest = 0;
+  double least = kInfinity;
+  for (std::size_t v = 0; v < aims.size(); ++v) {
+    const Vector& other = aims[v].direction;
+    double apart = std::abs(other[size_ - 1] - direction[size_ - 1]);
+    for (std::size_t l = 0; l + 1 < size_; ++l)
+      apart += std::abs(other[l] - direction[l]) / (domain_upper_[l] - domain_lower_[l]);
+    if (apart < least) least = apart, nearest = v;
+  }
+  return nearest;
+}
+
 // Along every axis, then at points of the domain and of the data; each in both senses.
-std::vector<AffineSet::Vector> AffineSet::Directions() const {
-  std::vector<Vector> all;
-  for (std::size_t l = 0; l < size_; ++l) all.push_back({}), all.back()[l] = 1;
+std::vector<AffineSet::Aim> AffineSet::Aims() const {
+  std::vector<Aim> all;
+  for (std::size_t l = 0; l < size_; ++l) all.push_back({{}, middle_}), all.back().direction[l] = 1;
   constexpr std::array kPrimes{2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37};
   for (int i = 1; i <= kSamples; ++i) {
-    Vector point{};
+    Aim aim{{}, middle_};
     for (std::size_t l = 0; l + 1 < size_; ++l) {
       double digit = 1, share = 0;  // the van der Corput sequence to a prime base
       for (int left = i; left > 0; left /= kPrimes[l]) share += (digit /= kPrimes[l]) * (left % kPrimes[l]);
-      point[l] = domain_lower_[l] + share * (domain_upper_[l] - domain_lower_[l]);
+      aim.direction[l] = domain_lower_[l] + share * (domain_upper_[l] - domain_lower_[l]);
+      const auto r = std::ranges::find(rest_variables_, columns_[l]) - rest_variables_.begin();
+      if (r < std::ssize(rest_variables_)) aim.from[static_cast<std::size_t>(r)] = aim.direction[l];
     }
-    point[size_ - 1] = 1;
-    all.push_back(point);
+    aim.direction[size_ - 1] = 1;
+    all.push_back(aim);
   }
   const std::size_t stride = ids_.size() / ToSize(kSamples) + 1;
   for (std::size_t i = 0; i < ids_.size(); i += stride) {
-    all.push_back({});
-    std::ranges::copy(phi(static_cast<int>(i)), all.back().begin());
+    all.push_back({{}, PlaceOf(i), static_cast<int>(i)});
+    std::ranges::copy(phi(static_cast<int>(i)), all.back().direction.begin());
   }
   for (std::size_t i = all.size(); i-- > 0;) {
-    Vector opposite = all[i];
-    for (double& entry : opposite) entry = -entry;
+    Aim opposite = all[i];
+    for (double& entry : opposite.direction) entry = -entry;
     all.push_back(opposite);
   }
   return all;
 }
 
-bool AffineSet::Prove(const Climb& found) {
+bool AffineSet::Prove(const Climb& found, const Ends& ends, int seen_from) {
   const auto i = ToSize(found.contradicted);
   const Factors factors(*this, found.basis);
   Climb up = found, down = found;
@@ -357,8 +429,8 @@ bool AffineSet::Prove(const Climb& found) {
   Vector along{}, against{};
   std::ranges::copy(phi(found.contradicted), along.begin());
   for (std::size_t l = 0; l < size_; ++l) down.weights[l] = -up.weights[l], against[l] = -along[l];
-  const double gap =
-      std::max(SubDown(lower_[i], SupportUpper(along, up)), SubDown(-SupportUpper(against, down), upper_[i]));
+  const double gap = std::max(SubDown(ends.lower[i], SupportUpper(along, ends, up)),
+                              SubDown(-SupportUpper(against, ends, down), ends.upper[i]));
   // Both sides outward: what the others say of phi . theta misses what this one shows, so A is empty (F).
   if (!(gap > 0)) return false;
   std::vector<std::size_t> order(size_);
@@ -366,24 +438,28 @@ bool AffineSet::Prove(const Climb& found) {
   std::ranges::sort(order, std::ranges::greater{}, [&](std::size_t j) { return std::abs(up.weights[j]); });
   contradiction_ = AffineContradiction{-1, {ids_[i]}, gap};
   for (const std::size_t j : order) contradiction_->rows.push_back(ids_[ToSize(found.basis[j])]);
+  if (HasRest() && seen_from >= 0 && std::ranges::count(contradiction_->rows, ids_[ToSize(seen_from)]) == 0)
+    contradiction_->rows.push_back(ids_[ToSize(seen_from)]);
   return true;
 }
 
 void AffineSet::SetHull() {
+  const Ends ends = EndsFrom(middle_, seen_lower_.data(), seen_upper_.data());
   for (std::size_t l = 0; l < size_; ++l) {
     Vector axis{}, opposite{};
     axis[l] = 1;
     opposite[l] = -1;
-    const Climb least = Search(opposite, all_, Nearest(opposite), kMostSteps),
-                most = Search(axis, all_, Nearest(axis), kMostSteps);
-    hull_[l] = {-SupportUpper(opposite, least), SupportUpper(axis, most)};
+    const Climb least = Search(opposite, ends, all_, Nearest(opposite), kMostSteps),
+                most = Search(axis, ends, all_, Nearest(axis), kMostSteps);
+    hull_[l] = {-SupportUpper(opposite, ends, least), SupportUpper(axis, ends, most)};
     if (l + 1 < size_) TestSlope(l, least, most);
     const double size = hull_[l].Magnitude();
     // Coarse on purpose: whoever derives the hull again, with other rounding, takes the same slope. Any slope is sound.
     const double unit = std::ldexp(1.0, std::max(std::ilogb(size), -900) - 16);
     slope_[l] = hull_[l].IsFinite() && size > 0 ? std::nearbyint(hull_[l].Middle() / unit) * unit : 0;
     reach_[l] = hull_[l].DistanceUpper(slope_[l]);
-    limit_[l] = std::min(limit_[l], size);
+    // M is the same wherever it is seen from, b + g is not.
+    limit_[l] = std::min(limit_[l], l + 1 < size_ ? size : AddUp(size, FarthestFrom(middle_.data())));
   }
 }
 
@@ -399,17 +475,20 @@ void AffineSet::TestSlope(std::size_t l, const Climb& least, const Climb& most) 
 void AffineSet::Derive() {
   if (contradiction_) return;
   is_bounded_ = false;
-  vertices_.clear();
+  if (!HasRest()) vertices_.clear(), aims_.clear();
   active_.clear();
   Basis basis{};
   const std::size_t rank = ids_.empty() ? 0 : ChooseBasis(basis);
   if (rank == size_ && BoundParameters(basis)) FindVertices(basis);
   if (!is_bounded_) {
+    vertices_.clear();
+    aims_.clear();
     active_.assign(basis.begin(), basis.begin() + std::ptrdiff_t(rank));
     active_.insert(active_.end(), all_.end() - std::ptrdiff_t(std::min(all_.size(), kMostKept / 2)), all_.end());
     SortActive();
   }
   Forget();
+  derived_ = ids_.size();
 }
 
 void AffineSet::SortActive() {
@@ -418,15 +497,23 @@ void AffineSet::SortActive() {
 }
 
 void AffineSet::FindVertices(const Basis& start) {
-  vertices_.push_back({start, {}});
-  for (const Vector& direction : Directions()) {
-    const Climb found = Search(direction, all_, Nearest(direction), kMostSteps);
-    if (found.contradicted >= 0 && Prove(found)) return;
-    if (active_.empty()) vertices_.clear();  // where the first search began
-    const bool is_known = std::ranges::any_of(
-        vertices_, [&](const Vertex& known) { return known.basis == found.basis && known.theta == found.theta; });
-    if (is_known) continue;
+  // With a rest, those of the last time are where searches begin, if there are any.
+  const std::vector<Vertex> last = std::exchange(vertices_, {});
+  const std::vector<Aim> last_aims = std::exchange(aims_, {});
+  if (last.empty()) vertices_.push_back({start, {}}), aims_.push_back({});
+  for (const Aim& aim : Aims()) {
+    const Ends ends = EndsFrom(aim.from, seen_lower_.data(), seen_upper_.data());
+    const Basis& from = last.empty() ? Nearest(aim.direction) : last[MostAlike(aim.direction, last_aims)].basis;
+    const Climb found = Search(aim.direction, ends, all_, from, kMostSteps);
+    if (found.contradicted >= 0 && Prove(found, ends, aim.row)) return;
+    if (active_.empty()) vertices_.clear(), aims_.clear();  // where the first search began
+    std::size_t v = 0;
+    while (v < vertices_.size() &&
+           !(vertices_[v].basis == found.basis && vertices_[v].theta == found.theta && aims_[v].from == aim.from))
+      ++v;
+    if (v < vertices_.size()) continue;
     vertices_.push_back({found.basis, found.theta});
+    aims_.push_back(aim);
     active_.insert(active_.end(), found.basis.begin(), found.basis.begin() + std::ptrdiff_t(size_));
   }
   SortActive();
@@ -434,6 +521,21 @@ void AffineSet::FindVertices(const Basis& start) {
   SetHull();
   is_bounded_ = std::all_of(hull_.begin(), hull_.begin() + std::ptrdiff_t(size_),
                             [](const Interval& range) { return range.IsFinite(); });
+  if (is_bounded_) TestPlaces();
+}
+
+// The observations that are new, from their own places, where a rest hides least of what contradicts them.
+void AffineSet::TestPlaces() {
+  if (!HasRest()) return;
+  const std::size_t stride = (ids_.size() - tested_) / kMostPlaces + 1;
+  for (; tested_ < ids_.size() && !contradiction_; tested_ += stride) {
+    Vector direction{};
+    std::ranges::copy(phi(static_cast<int>(tested_)), direction.begin());
+    const Ends ends = EndsFrom(PlaceOf(tested_), seen_lower_.data(), seen_upper_.data());
+    const Climb found = Search(direction, ends, all_, Nearest(direction), kMostSteps);
+    if (found.contradicted >= 0) static_cast<void>(Prove(found, ends, static_cast<int>(tested_)));
+  }
+  tested_ = ids_.size();
 }
 
 void AffineSet::Learn(int id, std::span<const double> z, double lower, double upper) {
@@ -443,38 +545,61 @@ void AffineSet::Learn(int id, std::span<const double> z, double lower, double up
   if (ids_.size() == before) return;
   // One that agrees with every known vertex cuts none off. If it cuts elsewhere, A is only taken for larger.
   if (LatestMayNarrow()) return Derive();
+  TestPlaces();
   Forget();
 }
 
-// Leaves what is not active: a query finds the same as before.
+// Leaves what is not active: a query finds the same as before. With a rest each observation bounds it nearby, and the
+// latest are active, too.
 void AffineSet::Forget() {
   if (ids_.size() <= kMostKept) return;
+  if (HasRest() && is_bounded_) {
+    active_.clear();
+    for (const Vertex& vertex : vertices_)
+      active_.insert(active_.end(), vertex.basis.begin(), vertex.basis.begin() + std::ptrdiff_t(size_));
+    SortActive();
+    active_.insert(active_.end(), all_.end() - std::ptrdiff_t((kMostKept - active_.size()) / 2), all_.end());
+    SortActive();
+  }
   std::vector<int> place(ids_.size());
   for (std::size_t kept = 0; kept < active_.size(); ++kept) {
     const auto i = ToSize(active_[kept]);
     place[i] = static_cast<int>(kept);
     for (std::size_t l = 0; l < size_; ++l) phi_[kept * size_ + l] = phi_[i * size_ + l];
+    for (std::size_t r = 0; r < rest_.size(); ++r) places_[kept * rest_.size() + r] = places_[i * rest_.size() + r];
     lower_[kept] = lower_[i];
     upper_[kept] = upper_[i];
     ids_[kept] = ids_[i];
   }
   const std::size_t kept = active_.size();
   phi_.resize(kept * size_);
+  places_.resize(kept * rest_.size());
+  seen_lower_.resize(HasRest() ? kept : 0);
+  seen_upper_.resize(seen_lower_.size());
   lower_.resize(kept);
   upper_.resize(kept);
   ids_.resize(kept);
   all_.resize(kept);
   active_ = all_;
+  tested_ = std::min(tested_, kept);
   for (Vertex& vertex : vertices_)
     for (std::size_t j = 0; j < size_; ++j) vertex.basis[j] = place[ToSize(vertex.basis[j])];
 }
 
-Interval AffineSet::Enclose(std::span<const double> at) const noexcept {
-  if (!is_bounded_) return Interval::Entire();
+Interval AffineSet::Enclose(std::span<const double> z) const noexcept {
+  if (!is_bounded_ || ids_.size() > kMostKept) return Interval::Entire();
   Vector along{}, against{};
-  for (std::size_t l = 0; l < size_; ++l) along[l] = at[l], against[l] = -at[l];
-  const double upper = SupportUpper(along, Search(along, active_, Nearest(along), kMostStepsOfAQuery));
-  return {-SupportUpper(against, Search(against, active_, Nearest(against), kMostStepsOfAQuery)), upper};
+  for (std::size_t l = 0; l + 1 < size_; ++l) along[l] = z[ToSize(columns_[l])];
+  along[size_ - 1] = 1;
+  for (std::size_t l = 0; l < size_; ++l) against[l] = -along[l];
+  Place from{};
+  for (std::size_t r = 0; r < rest_.size(); ++r) from[r] = z[ToSize(rest_variables_[r])];
+  std::array<double, kMostKept> lower, upper;
+  const Ends ends = EndsFrom(from, lower.data(), upper.data());
+  const std::span<const int> rows = HasRest() ? all_ : active_;
+  const Climb most = Search(along, ends, rows, Nearest(along), kMostStepsOfAQuery),
+              least = Search(against, ends, rows, HasRest() ? most.basis : Nearest(against), kMostStepsOfAQuery);
+  return {-SupportUpper(against, ends, least), SupportUpper(along, ends, most)};
 }
 
 }  // namespace forereach

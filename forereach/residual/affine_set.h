@@ -9,7 +9,12 @@ which is at most sum_j w_j (upper_j, or lower_j if w_j < 0) + sum_l |rest_l| lim
 plain arithmetic: it walks from one B to a better one until no other observation is violated at its vertex. The rule is
 evaluated outward, and `limit` bounds |theta| beforehand: with R about the inverse of the matrix Phi of some B,
 |theta| <= |R| |y| + |I - R Phi| |theta| for y = Phi theta, so any v with |R| |y| + |I - R Phi| v <= v, v > 0, is a
-bound. docs/soundness.md, 3.19. */
+bound.
+
+Of a row that is affine up to a rest, r_k(z) = M_k z + b_k + g(z) with |g(z) - g(z')| <= d(z, z') = sum_l G_l |z_l -
+z'_l|, the same holds as seen from any c: for theta = (M_k, b_k + g(c)) and r_k(c) = (c, 1) . theta,
+    lower_i - d(z_i, c) <= phi_i . theta <= upper_i + d(z_i, c).
+A query looks from its own place. docs/soundness.md, 3.19. */
 #pragma once
 
 #include <array>
@@ -19,6 +24,7 @@ bound. docs/soundness.md, 3.19. */
 #include <vector>
 
 #include "forereach/numerics/interval.h"
+#include "forereach/numerics/limits.h"
 #include "forereach/residual/declaration.h"
 
 namespace forereach {
@@ -27,15 +33,18 @@ namespace forereach {
 struct AffineContradiction {
   int coordinate;         ///< k
   std::vector<int> rows;  ///< Of the observations, by their ids: first the one that is predicted, then the q others,
-                          ///< the most decisive first. Or q that give a slope of more than is declared.
+                          ///< the most decisive first, and the one from whose place they are seen, if it is
+                          ///< another one. Or q that give a slope of more than is declared.
   double gap;             ///< In the unit of state k, rounded down; the least size of that slope.
   double most = 0;        ///< What is declared of the slope; 0: no slope contradicts.
 };
 
 class AffineSet final {
  public:
-  /** @param domain_lower, domain_upper d_z entries each: where queries are expected. */
-  AffineSet(std::vector<int> columns, std::span<const double> domain_lower, std::span<const double> domain_upper);
+  /** @param domain_lower, domain_upper d_z entries each: where queries are expected; with a rest, where queries and
+  observations have to lie. @param rest G, d_z entries, or none for zeros. */
+  AffineSet(std::vector<int> columns, std::span<const double> domain_lower, std::span<const double> domain_upper,
+            std::span<const double> rest = {});
 
   /** Declares that |M_kl| <= most, positive; for column index j. Derive tests it, and it bounds nothing. */
   void Declare(std::size_t j, double most) { most_[j] = most; }
@@ -43,13 +52,14 @@ class AffineSet final {
   void Add(int id, std::span<const double> z, double lower, double upper);
   /** Derives contradiction, hull, slope and the vertices from which queries start. Of more than kMostKept observations
   those are kept that decide at a vertex, or, where A is not bounded, that span what they excite, and the latest: a
-  bound by some of them holds, and no Learn takes longer for all that was learned before. Cost: about 100 linear
-  programs of the observations and q unknowns; a millisecond for some hundred observations. */
+  bound by some of them holds, and no Learn takes longer for all that was learned before. With a rest, the latest are
+  kept beside those at a vertex, too. Cost: about 100 linear programs of the observations and q unknowns; a millisecond
+  for some hundred observations. With a rest as many more as there are new observations, at most kMostPlaces. */
   void Derive();
   /** Adds an observation to those of Derive. Cost: O(vertices), and Derive if the observation disagrees with one. */
   void Learn(int id, std::span<const double> z, double lower, double upper);
 
-  static constexpr std::size_t kMostKept = 2048;
+  static constexpr std::size_t kMostKept = 2048, kMostPlaces = 512;
   [[nodiscard]] std::size_t num_kept() const { return ids_.size(); }
 
   /** The observations of a proof that A is empty, if Derive found one. */
@@ -65,22 +75,33 @@ class AffineSet final {
   [[nodiscard]] double slope(std::size_t j) const { return slope_[j]; }
   /** At least |M_kl - slope| over A. */
   [[nodiscard]] double reach(std::size_t j) const { return reach_[j]; }
-  /** Encloses {M_kl : theta in A}; the last entry is that of b. */
+  /** Encloses {M_kl : theta in A}; the last entry is that of b. With a rest, A as seen from the middle of the domain.
+   */
   [[nodiscard]] const Interval& hull(std::size_t j) const { return hull_[j]; }
 
-  /** Bounds on phi . theta over A, phi of q entries, the last one 1: infinite if A is not bounded. Allocates nothing.
-  Cost: O(v q) for the v vertices, and some O(a q) for a observations: all of a few, or those that decide at a
-  vertex. */
-  [[nodiscard]] Interval Enclose(std::span<const double> phi) const noexcept;
+  /** Bounds on r_k(z), z of at least d_z entries: infinite if A is not bounded. Allocates nothing. Cost: O(v q) for the
+  v vertices, and some O(a q) for a observations: all of a few, or those that decide at a vertex; with a rest all. */
+  [[nodiscard]] Interval Enclose(std::span<const double> z) const noexcept;
 
  private:
   static constexpr std::size_t kMostUnknowns = AffineRows::kMaxColumns + 1;
   using Vector = std::array<double, kMostUnknowns>;
   using Basis = std::array<int, kMostUnknowns>;
+  using Place = std::array<double, kMaxVariables>;  // in the variables of the rest
   class Factors;
   struct Vertex {
     Basis basis;
     Vector theta;
+  };
+  // Where a search looks from, and along which direction.
+  struct Aim {
+    Vector direction;
+    Place from;
+    int row = -1;  // the observation at that place, if it is one's
+  };
+  // lower_ and upper_ as seen from a place.
+  struct Ends {
+    const double *lower, *upper;
   };
   struct Climb {
     Basis basis{};
@@ -92,15 +113,22 @@ class AffineSet final {
   [[nodiscard]] std::size_t ChooseBasis(Basis& basis);
   [[nodiscard]] bool BoundParameters(const Basis& basis);
   void Perturb(const Vector& weights, const Basis& basis, Vector& direction) const noexcept;
-  [[nodiscard]] Climb Search(const Vector& direction, std::span<const int> rows, const Basis& start,
+  [[nodiscard]] bool HasRest() const { return !rest_.empty(); }
+  [[nodiscard]] double Apart(const double* a, const double* b) const noexcept;
+  [[nodiscard]] double FarthestFrom(const double* place) const;
+  [[nodiscard]] Ends EndsFrom(const Place& from, double* lower, double* upper) const noexcept;
+  [[nodiscard]] Climb Search(const Vector& direction, const Ends& ends, std::span<const int> rows, const Basis& start,
                              int most_steps) const noexcept;
-  [[nodiscard]] double SupportUpper(const Vector& direction, const Climb& found) const noexcept;
+  [[nodiscard]] double SupportUpper(const Vector& direction, const Ends& ends, const Climb& found) const noexcept;
   [[nodiscard]] const Basis& Nearest(const Vector& direction) const noexcept;
-  [[nodiscard]] std::vector<Vector> Directions() const;
-  [[nodiscard]] bool Prove(const Climb& found);
+  [[nodiscard]] std::size_t MostAlike(const Vector& direction, std::span<const Aim> aims) const noexcept;
+  [[nodiscard]] Place PlaceOf(std::size_t i) const;
+  [[nodiscard]] std::vector<Aim> Aims() const;
+  [[nodiscard]] bool Prove(const Climb& found, const Ends& ends, int seen_from);
   void SetHull();
   void TestSlope(std::size_t l, const Climb& least, const Climb& most);
   void FindVertices(const Basis& start);
+  void TestPlaces();
   void SortActive();
   [[nodiscard]] bool LatestMayNarrow() const;
   void Forget();
@@ -109,10 +137,19 @@ class AffineSet final {
   std::size_t size_;                                    // q
   std::array<double, AffineRows::kMaxColumns> most_{};  // of each column; 0: nothing is declared
   std::vector<double> domain_lower_, domain_upper_;
-  std::vector<double> phi_, lower_, upper_;  // q, one and one entries for each observation
+  // The variables of the rest, their G_l, and the domain in them.
+  std::vector<int> rest_variables_;
+  std::vector<double> rest_, rest_lower_, rest_upper_;
+  Place middle_{};                               // of the domain
+  std::vector<double> phi_, lower_, upper_;      // q, one and one entries for each observation
+  std::vector<double> places_;                   // an entry for each variable of the rest
+  std::vector<double> seen_lower_, seen_upper_;  // room for EndsFrom while A is derived
+  std::size_t tested_ = 0;                       // so many observations were looked at from their own places
+  std::size_t derived_ = 0;                      // so many were left by the last Derive
   std::vector<int> ids_;
   std::vector<int> all_, active_;  // of the observations: all, and those that a query looks at or Forget keeps
   std::vector<Vertex> vertices_;
+  std::vector<Aim> aims_;  // by which the vertices were found
   Vector limit_{}, slope_{}, reach_{};
   std::array<Interval, kMostUnknowns> hull_{};
   double size_of_values_ = 0;

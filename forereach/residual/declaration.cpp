@@ -37,7 +37,7 @@ bool AreIndices(const std::vector<int>& all, int size) {
 }
 
 void ValidateAffine(const Declaration& declaration) {
-  const auto& [rows, columns] = declaration.affine;
+  const auto& [rows, columns, rest] = declaration.affine;
   RequireAffine(AreIndices(rows, static_cast<int>(declaration.lipschitz.rows())),
                 "rows are states, each once, in their order");
   RequireAffine(AreIndices(columns, static_cast<int>(declaration.lipschitz.cols())),
@@ -46,15 +46,23 @@ void ValidateAffine(const Declaration& declaration) {
   RequireAffine(
       columns.size() <= AffineRows::kMaxColumns,
       std::to_string(columns.size()) + " columns, must be at most " + std::to_string(AffineRows::kMaxColumns));
+  RequireAffine(
+      rest.size() == 0 || (rest.rows() == declaration.lipschitz.rows() && rest.cols() == declaration.lipschitz.cols()),
+      "rest has not the size of L");
+  for (Eigen::Index k = 0; k < rest.rows(); ++k)
+    for (Eigen::Index l = 0; l < rest.cols(); ++l) {
+      RequireBound("affine: rest " + std::to_string(k) + ", " + std::to_string(l), rest(k, l));
+      RequireAffine(rest(k, l) == 0 || declaration.affine.Contains(k),
+                    "rest of row " + std::to_string(k) + ", which is not affine");
+    }
   for (const int k : rows)
     for (Eigen::Index l = 0; l < declaration.lipschitz.cols(); ++l) {
       const std::string entry = "row " + std::to_string(k) + ", variable " + std::to_string(l) + ": ";
-      const bool is_column = std::ranges::binary_search(columns, static_cast<int>(l));
-      // It would say |M_kl| <= L_kl of a slope that is zero by declaration, and errors would count by it (soundness
-      // 3.19).
-      RequireAffine(is_column || declaration.lipschitz(k, l) == 0, entry + "bounded by lipschitz, and no column");
-      RequireAffine(!is_column || declaration.lipschitz(k, l) > 0 || declaration.VariableError(l) == 0,
-                    entry + "recorded with an error, which counts by lipschitz: declare a bound on |M| there");
+      const bool depends = declaration.affine.DependsOn(k, l);
+      // It would bound a slope that is zero by declaration, and errors would count by it (soundness 3.19).
+      RequireAffine(depends || declaration.lipschitz(k, l) == 0, entry + "bounded by lipschitz, and no column");
+      RequireAffine(!depends || declaration.lipschitz(k, l) > 0 || declaration.VariableError(l) == 0,
+                    entry + "recorded with an error, which counts by lipschitz: declare a bound on the slope there");
     }
 }
 

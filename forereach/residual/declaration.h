@@ -16,15 +16,27 @@ namespace forereach {
 
 class GrowingDisturbance;
 
-/** Rows k of the residual that are affine: there are M_k and b_k, the same in every step, with
-    r_k(z) = sum over columns l of M_kl z_l + b_k   for all z in Z_cert.
-Data bound them (affine_set.h). An entry L_kl > 0 says |M_kl| <= L_kl, by which errors of z_l count as in other rows. */
+/** Rows k of the residual that are affine up to a rest g_k: there are M_k, b_k and g_k, the same in every step, with
+    r_k(z) = sum over columns l of M_kl z_l + b_k + g_k(z),   |g_k(z) - g_k(z')| <= sum_l G_kl |z_l - z'_l|
+for all z, z' in Z_cert. Data bound them (affine_set.h). An entry L_kl > 0 says |M_kl| <= L_kl, and that r_k changes by
+no more, as in other rows, by which errors of z_l count. */
 struct AffineRows {
   static constexpr std::size_t kMaxColumns = 12;
 
   std::vector<int> rows = {}, columns = {};  ///< Ascending: states, and variables of z.
+  Eigen::MatrixXd rest = {};                 ///< G, as L, zero in other rows; no entries: zeros.
 
   [[nodiscard]] bool Contains(Eigen::Index k) const { return std::ranges::binary_search(rows, static_cast<int>(k)); }
+  /** G_kl. */
+  [[nodiscard]] double Rest(Eigen::Index k, Eigen::Index l) const { return rest.size() == 0 ? 0 : rest(k, l); }
+  /** Whether row k may depend on variable l: a column, or G_kl > 0. */
+  [[nodiscard]] bool DependsOn(Eigen::Index k, Eigen::Index l) const {
+    return Contains(k) && (Rest(k, l) > 0 || std::ranges::binary_search(columns, static_cast<int>(l)));
+  }
+  /** Whether any row may. */
+  [[nodiscard]] bool DependsOn(Eigen::Index l) const {
+    return std::ranges::any_of(rows, [&](int k) { return DependsOn(k, l); });
+  }
 };
 
 /** A box in some variables of z in which less holds than in the whole domain: for all z, z' of it in Z_cert
@@ -61,7 +73,7 @@ struct Declaration {
   /** e is not that of the given transitions, which are exact, as those of a simulation are; of those that are learned
   it is (Transitions::num_learned). */
   bool given_are_exact = false;
-  /** Rows that are affine: their rows of L are zero but in their columns. */
+  /** Rows that are affine: their rows of L are zero but where they depend on a variable. */
   AffineRows affine = {};
   /** At most kMaxRegions, which bound at most kMaxVariables variables and cut their ranges into kMaxCells cells. They
   narrow no affine row. */

@@ -6,6 +6,7 @@
 #include "lcmtypes/seal.h"
 #include "tests/certifier/gap_task.h"
 #include "tests/messages.h"
+#include "tests/oracle/traced_random.h"
 
 namespace forereach::gate_pieces_test {
 
@@ -66,6 +67,36 @@ TEST_F(GatePiecesTest, TheLongestCallSoFarCounts) {
   std::int64_t now = kNow;
   const GateAnswer answer = Decide([&] { return now += costs.at(std::min(reading++, costs.size() - 1)); });
   EXPECT_THAT(GetText(answer.decision.message), EndsWith("; so after 5 trials with X0 in pieces"));
+}
+
+// Under load a call takes any time, and longer than the longest before. The clock is read before, between and after the
+// calls.
+TEST_F(GatePiecesTest, UnderLoadNothingIsCertifiedLaterThanTheBudget) {
+  int in_time = 0, late = 0, given_up = 0;
+  for (TracedRandom random(37); random.Again(600);) {
+    std::vector<std::int64_t> read;
+    std::int64_t now = kNow;
+    const GateAnswer answer = Decide([&] {
+      now += random.Coin(0.05) ? random.Integer(0, 20'000) : random.Integer(0, 100);
+      read.push_back(now - kNow);
+      return now;
+    });
+    const std::int64_t begin = read.front(), taken = read.back() - begin;
+    ASSERT_GE(read.size(), 3u);
+    std::int64_t longest = 0;
+    for (std::size_t i = 1; i + 2 < read.size(); ++i) {
+      longest = std::max(longest, read[i] - read[i - 1]);
+      ASSERT_LE(read[i] + longest, begin + 2500) << "trial " << i << " is not to begin";
+    }
+    const bool is_late = answer.decision.cause == decision_t::CAUSE_OVERRUN;
+    EXPECT_EQ(is_late || answer.certified.has_value(), answer.decision.cause != decision_t::CAUSE_OBSTACLE);
+    if (answer.certified) EXPECT_LE(taken, 5000);
+    if (is_late) EXPECT_GT(taken, 5000);
+    ++(is_late ? late : answer.certified ? in_time : given_up);
+  }
+  EXPECT_GT(in_time, 10);
+  EXPECT_GT(late, 2);
+  EXPECT_GT(given_up, 10);
 }
 
 TEST_F(GatePiecesTest, WhatWasCertifiedInPiecesStandsWhenItIsJudgedAgain) {

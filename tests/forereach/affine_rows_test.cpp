@@ -184,6 +184,97 @@ TEST_F(AffineResidual, CountsErrorsOfRecordsAndInputsByTheDeclaredSlopes) {
   }
 }
 
+// The drag grows with the square of the speed as well: of up to 2 m/s its slope is kQuadratic.
+constexpr double kQuadratic = 0.001;
+
+Problem QuadraticallyDragged(int steps, double noise) {
+  Problem problem = DraggedPointMass(steps, noise);
+  for (int i = 0; i < steps; ++i)
+    for (int k = 2; k < 4; ++k)
+      problem.transitions.x_next(i, k) -=
+          kQuadratic / 4 * problem.transitions.z(i, k) * std::abs(problem.transitions.z(i, k));
+  return problem;
+}
+
+// 6 m/s in the domain, so three times the slope.
+Problem WithRest(Problem problem) {
+  problem.declaration.affine.rest.setZero(4, 6);
+  problem.declaration.affine.rest(2, 2) = problem.declaration.affine.rest(3, 3) = 3 * kQuadratic;
+  return problem;
+}
+
+TEST_F(AffineResidual, UpToARestIsNarrowerThanByLipschitzBoundsAlone) {
+  const Problem dragged = QuadraticallyDragged(40, 2e-5);
+  EXPECT_TRUE(Certifier(Shared(dragged)).violation()) << "it is not affine";
+  Problem lipschitz = dragged;
+  lipschitz.declaration.affine = {};
+  for (int k = 2; k < 4; ++k) {
+    lipschitz.declaration.lipschitz(k, k) = kDt * kDrag + 3 * kQuadratic;
+    lipschitz.declaration.lipschitz(k, k + 2) = kDt * (1 - kGain);
+  }
+  ASSERT_EQ(Certify(Certifier(Shared(lipschitz))).outcome, Outcome::kCertified);
+  const double wide = tube_.half_width(16)[0];
+  ASSERT_EQ(Certify(Certifier(Shared(WithRest(dragged)))).outcome, Outcome::kCertified);
+  const double narrow = tube_.half_width(16)[0];
+  std::cout << "half-width of x after 2 s: affine up to a rest " << narrow << " m, Lipschitz " << wide << " m\n";
+  EXPECT_LT(narrow, 0.5 * wide);
+  double x = 0, v = 1;
+  for (int t = 0; t < 16; ++t) {
+    EXPECT_TRUE(tube_.hull(t, 0).Contains(x) && tube_.hull(t, 2).Contains(v));
+    x += kDt * v + kDt * kDt / 2;
+    v += kDt * (kGain - kDrag * v) - kQuadratic / 4 * v * std::abs(v);
+  }
+}
+
+// A rest of nothing is none; a small one costs little, however the row is seen.
+TEST_F(AffineResidual, OfASmallRestIsAlmostThatOfNone) {
+  Problem problem = DraggedPointMass(40, 1e-4);
+  ASSERT_EQ(Certify(Certifier(Shared(problem))).outcome, Outcome::kCertified);
+  const double none = tube_.half_width(16)[0];
+  const auto width = [&](double slope) {
+    problem.declaration.affine.rest = Eigen::MatrixXd::Constant(4, 6, slope);
+    problem.declaration.affine.rest.topRows(2).setZero();
+    EXPECT_EQ(Certify(Certifier(Shared(problem))).outcome, Outcome::kCertified);
+    return tube_.half_width(16)[0];
+  };
+  EXPECT_EQ(width(0), none);
+  EXPECT_GE(width(1e-7), none);
+  EXPECT_LE(width(1e-7), 1.1 * none);
+  EXPECT_GT(width(1e-3), 1.1 * none);
+}
+
+// What is learned near the plan narrows it, although a rest hides it from afar; so does it contradict.
+TEST_F(AffineResidual, UpToARestIsNarrowedAndContradictedByWhatIsLearned) {
+  const Problem all = WithRest(QuadraticallyDragged(300, 1e-3));
+  Problem first = all;
+  first.transitions = {all.transitions.z.topRows(20), all.transitions.x_next.topRows(20)};
+  Certifier certifier(Shared(first));
+  ASSERT_EQ(Certify(certifier).outcome, Outcome::kCertified);
+  const double before = tube_.half_width(16)[0];
+  for (int i = 20; i < 300; ++i) {
+    const Eigen::VectorXd z = all.transitions.z.row(i), next = all.transitions.x_next.row(i);
+    ASSERT_EQ(certifier.Learn({z.data(), 6}, {next.data(), 4}), Learned::kAdded);
+  }
+  ASSERT_FALSE(certifier.violation());
+  ASSERT_EQ(Certify(certifier).outcome, Outcome::kCertified);
+  const double after = tube_.half_width(16)[0];
+  EXPECT_LT(after, 0.8 * before);
+  ASSERT_EQ(Certify(Certifier(Shared(all))).outcome, Outcome::kCertified);
+  EXPECT_NEAR(tube_.half_width(16)[0], after, 0.02 * after);
+  // The same step again, otherwise: less than a rest could hide elsewhere.
+  const Eigen::VectorXd z = all.transitions.z.row(3);
+  Eigen::VectorXd next = all.transitions.x_next.row(3);
+  next[2] += 0.005;
+  ASSERT_EQ(certifier.Learn({z.data(), 6}, {next.data(), 4}), Learned::kAdded);
+  ASSERT_TRUE(certifier.violation());
+  EXPECT_EQ(certifier.violation()->coordinate, 2);
+  EXPECT_EQ(certifier.violation()->second, 300);
+  Problem few = all;
+  few.transitions = certifier.Contradiction();
+  EXPECT_LE(few.transitions.size(), 7);
+  EXPECT_TRUE(Certifier(Shared(few)).violation());
+}
+
 TEST(AffineDeclaration, IsRefusedWhereItIsNotBuilt) {
   const auto refusal = [](const std::function<void(Problem&)>& change) {
     Problem problem = DraggedPointMass(8, 1e-4);
@@ -203,6 +294,27 @@ TEST(AffineDeclaration, IsRefusedWhereItIsNotBuilt) {
                 p.declaration.lipschitz(2, 2) = 0.1;
               }),
               HasSubstr("affine: row 3, variable 2: recorded with an error"));
+  const auto with_rest = [&](int row, int column, double slope) {
+    return [=](Problem& p) {
+      p.declaration.affine.rest.setZero(4, 6);
+      p.declaration.affine.rest(row, column) = slope;
+    };
+  };
+  EXPECT_EQ(refusal(with_rest(2, 0, 0.1)), "");
+  EXPECT_THAT(refusal(with_rest(1, 0, 0.1)), HasSubstr("affine: rest of row 1, which is not affine"));
+  EXPECT_THAT(refusal(with_rest(2, 0, -0.1)), HasSubstr("affine: rest 2, 0: -0.1"));
+  EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.rest.setZero(4, 5); }), HasSubstr("has not the size of L"));
+  EXPECT_THAT(refusal([&](Problem& p) {
+                with_rest(2, 0, 0.1)(p);
+                p.declaration.state_error = Vec({1e-3, 0, 0, 0});
+              }),
+              HasSubstr("affine: row 2, variable 0: recorded with an error"));
+  EXPECT_EQ(refusal([&](Problem& p) {
+              with_rest(2, 0, 0.1)(p);
+              p.declaration.state_error = Vec({1e-3, 0, 0, 0});
+              p.declaration.lipschitz(2, 0) = 0.1;
+            }),
+            "");
   EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.rows = {3, 2}; }), HasSubstr("in their order"));
   EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.columns = {2, 6}; }), HasSubstr("columns are"));
   EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.columns = {}; }), HasSubstr("or neither"));

@@ -143,6 +143,10 @@ TEST_F(Allocation, CertifyAllocatesNothingForAffineRows) {
   problem.declaration.affine = {{2, 3}, {3}};
   certifier_.emplace(std::make_shared<Problem>(problem));
   EXPECT_EQ(Count(10, 0, {}, Outcome::kCertified), 0);
+  problem.declaration.affine.rest.setZero(6, 8);
+  problem.declaration.affine.rest(3, 5) = 1e-4;
+  certifier_.emplace(std::make_shared<Problem>(problem));
+  EXPECT_EQ(Count(10, 0, {}, Outcome::kCertified), 0);
 }
 
 TEST_F(Allocation, CertifyAllocatesNothingForExpressions) {

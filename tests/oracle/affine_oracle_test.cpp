@@ -2,6 +2,8 @@
 // data admit, in 256 bits, against tubes.
 #include "tests/test.h"
 
+#include <numeric>
+
 #include "forereach/residual/affine_rows_enclosure.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/affine_problems.h"
@@ -136,6 +138,141 @@ TEST(AffineSetOracle, BoundsEveryParameterThatTheDataAdmitAndLittleMore) {
   EXPECT_GT(bounded, 80);
 }
 
+// One or two columns, and a variable that is none. Numbers of few bits, so that ends are exact in doubles.
+struct DataWithRest {
+  std::vector<double> rest;
+  Data data;
+  std::vector<std::vector<double>> places;
+
+  DataWithRest(Random& random, int columns, int count, double width, double off) {
+    const auto any = [&](double most, double unit) { return unit * std::round(random.Uniform(-most, most) / unit); };
+    std::vector<double> theta, knee, weight;
+    for (int l = 0; l <= columns; ++l) {
+      theta.push_back(any(1, 0x1p-10));
+      knee.push_back(any(1, 0x1p-10));
+      weight.push_back(random.Sign());
+      rest.push_back(random.Coin(0.3) ? 0 : std::abs(any(0.5, 0x1p-10)));
+    }
+    for (int i = 0; i < count; ++i) {
+      std::vector<double>& z = places.emplace_back();
+      std::vector<double>& phi = data.phi.emplace_back();
+      double value = theta.back() + any(off, 0x1p-30);
+      for (int l = 0; l <= columns; ++l) {
+        z.push_back(random.Coin(0.2) ? random.Integer(-2, 2) : any(2, 0x1p-10));
+        const auto at = static_cast<std::size_t>(l);
+        value += weight[at] * rest[at] * std::abs(z.back() - knee[at]);
+        if (l < columns) value += theta[at] * z.back(), phi.push_back(z.back());
+      }
+      phi.push_back(1);
+      data.lower.push_back(value - width + any(width / 2, 0x1p-30));
+      data.upper.push_back(value + width + any(width / 2, 0x1p-30));
+    }
+  }
+
+  AffineSet Set() const {
+    const std::vector<double> least(rest.size(), -2), most(rest.size(), 2);
+    std::vector<int> columns;
+    for (int l = 0; l + 1 < std::ssize(rest); ++l) columns.push_back(l);
+    AffineSet set(columns, least, most, rest);
+    for (std::size_t i = 0; i < places.size(); ++i)
+      set.Add(static_cast<int>(i), places[i], data.lower[i], data.upper[i]);
+    set.Derive();
+    return set;
+  }
+
+  double Apart(const std::vector<double>& a, const std::vector<double>& b) const {
+    double sum = 0;
+    for (std::size_t l = 0; l < rest.size(); ++l) sum += rest[l] * std::abs(a[l] - b[l]);
+    return sum;
+  }
+
+  // What the observations are without a rest, as seen from z.
+  Data From(const std::vector<double>& z) const {
+    Data seen = data;
+    for (std::size_t i = 0; i < places.size(); ++i)
+      seen.lower[i] -= Apart(places[i], z), seen.upper[i] += Apart(places[i], z);
+    return seen;
+  }
+};
+
+TEST(AffineSetOracle, WithARestBoundsTheRowWhereverItIsSeenFrom) {
+  int bounded = 0;
+  for (TracedRandom random(863); random.Again(100);) {
+    const int columns = random.Integer(1, 2), count = random.Integer(columns + 1, 6);
+    const DataWithRest with(random, columns, count, std::ldexp(1, -random.Integer(0, 20)), 0);
+    const AffineSet set = with.Set();
+    ASSERT_FALSE(set.contradiction());
+    if (!set.IsBounded()) continue;
+    ++bounded;
+    for (int query = 0; query < 6; ++query) {
+      std::vector<double> z = random.Coin() ? with.places[static_cast<std::size_t>(random.Below(count))]
+                                            : std::vector<double>(static_cast<std::size_t>(columns) + 1);
+      for (double& entry : z)
+        if (random.Coin(0.7)) entry = 0x1p-10 * random.Integer(-2048, 2048);
+      std::optional<Rational> least, most;
+      for (const auto& theta : Vertices(with.From(z))) {
+        Rational value = theta.back();
+        for (std::size_t l = 0; l + 1 < theta.size(); ++l) value += Rational(z[l]) * theta[l];
+        if (!least || value < *least) least = value;
+        if (!most || value > *most) most = value;
+      }
+      ASSERT_TRUE(least);
+      const Interval bounds = set.Enclose(z);
+      ASSERT_TRUE(exact::AtMost(*most, bounds.upper)) << "no tolerance";
+      ASSERT_TRUE(exact::AtLeast(*least, bounds.lower)) << "no tolerance";
+      EXPECT_LE(bounds.upper - bounds.lower, Rational(*most - *least).get_d() * (1 + 1e-5) + 1e-9) << "tight";
+    }
+    for (const auto& theta : Vertices(with.From(std::vector<double>(with.rest.size()))))
+      for (std::size_t l = 0; l + 1 < theta.size(); ++l) {
+        ASSERT_TRUE(exact::Inside(theta[l], set.hull(l)));
+        const Rational away = theta[l] - Rational(set.slope(l));
+        ASSERT_TRUE(exact::AtMost(away, set.reach(l)) && exact::AtMost(-away, set.reach(l)));
+      }
+  }
+  EXPECT_GT(bounded, 60);
+}
+
+// With one column: some M is left if, for each two observations, lower_i - upper_j - M (z_i - z_j) <= d(z_i, z_j).
+bool LeavesNoSlope(const DataWithRest& with, const std::vector<int>& rows) {
+  std::optional<Rational> least, most;
+  for (const int first : rows)
+    for (const int second : rows) {
+      const auto i = static_cast<std::size_t>(first), j = static_cast<std::size_t>(second);
+      const Rational apart = Rational(with.places[i][0]) - Rational(with.places[j][0]);
+      const Rational over = Rational(with.data.lower[i]) - Rational(with.data.upper[j]) -
+                            Rational(with.Apart(with.places[i], with.places[j]));
+      if (apart == 0 && over > 0) return true;
+      if (apart > 0 && (!least || over / apart > *least)) least = over / apart;
+      if (apart < 0 && (!most || over / apart < *most)) most = over / apart;
+    }
+  return least && most && *least > *most;
+}
+
+TEST(AffineSetOracle, AContradictionBesideARestIsAProofAndMostAreFound) {
+  int found = 0, missed = 0, agreed = 0;
+  for (TracedRandom random(864); random.Again(300);) {
+    const int count = random.Integer(3, 7);
+    const double width = std::ldexp(1, -random.Integer(2, 20));
+    const DataWithRest with(random, 1, count, width, random.Coin(0.7) ? 4 * width : 0);
+    const AffineSet set = with.Set();
+    std::vector<int> all(static_cast<std::size_t>(count));
+    std::iota(all.begin(), all.end(), 0);
+    const bool is_empty = LeavesNoSlope(with, all);
+    if (set.contradiction()) {
+      ++found;
+      ASSERT_LE(set.contradiction()->rows.size(), 4);
+      ASSERT_TRUE(LeavesNoSlope(with, set.contradiction()->rows)) << "those that it names are enough";
+    } else {
+      agreed += !is_empty;
+      missed += is_empty && set.IsBounded();
+    }
+  }
+  RecordProperty("missed", missed);
+  EXPECT_GT(found, 30);
+  EXPECT_LT(missed, found / 3);
+  EXPECT_GT(agreed, 50);
+}
+
 // 20,000 observations one by one: what is kept is bounded, encloses what all of them admit, and is hardly wider.
 TEST(AffineSetOracle, OfMuchThatIsLearnedKeepsWhatDecides) {
   Random random(7);
@@ -223,8 +360,8 @@ class AffineContainment : public testing::TestWithParam<std::tuple<bool, bool, b
 
 TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
   const auto [bicycle, disturbed, shifted] = GetParam();
-  TracedRandom random(871 + bicycle), records(881 + bicycle);
-  int certified = 0, slices = 0, learned = 0;
+  TracedRandom random(871 + bicycle), records(881 + bicycle), rests(891 + bicycle);
+  int certified = 0, slices = 0, learned = 0, with_rest = 0;
   for (int trial = 0; trial < 60; ++trial) {
     SCOPED_TRACE("trial " + std::to_string(trial));
     const auto problem = AnyProblem(random, bicycle, random.Integer(6, 24));
@@ -235,7 +372,7 @@ TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
       if (random.Coin()) problem->declaration.regions.push_back({{{l, {side, 1e3}}}, problem->declaration.lipschitz});
     }
     if (disturbed) Disturb(random, *problem);
-    const AffineTruth truth = MakeAffine(random, *problem);
+    const AffineTruth truth = MakeAffine(random, *problem, rests.Coin() ? &rests : nullptr);
     if (shifted) Shift(random, *problem);
     // Of some the slopes are declared, and the transitions are recorded with errors.
     if (records.Coin()) DeclareSlopes(*problem);
@@ -251,17 +388,16 @@ TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
       const Decision decision = certifier->Certify(query.plan(), query.initial_set, query.obstacles, tube);
       ASSERT_NE(decision.outcome, Outcome::kFalsified);
       certified += decision.outcome == Outcome::kCertified;
+      with_rest += problem->declaration.affine.rest.size() > 0 && tube.length() > 0;
       for (int rollout = 0; rollout < 4; ++rollout) {
         const AdmissibleResidual others(random, *problem);
         const AffineRows& affine = problem->declaration.affine;
-        AffineTruth parameters;
-        for (std::size_t i = 0; i < truth.size(); ++i)
-          parameters.push_back(AdmissibleParameters(random, *told, *problem, affine.rows[i], truth[i]));
+        std::vector<AdmissibleRow> rows;
+        for (std::size_t i = 0; i < affine.rows.size(); ++i)
+          rows.emplace_back(random, rests, *told, *problem, i, truth);
         const auto residual = [&](const std::vector<Real>& z, int k) {
           const auto row = std::ranges::find(affine.rows, k) - affine.rows.begin();
-          return row < std::ssize(affine.rows)
-                     ? AffineValue(parameters[static_cast<std::size_t>(row)], affine.columns, z)
-                     : others(z, k);
+          return row < std::ssize(affine.rows) ? rows[static_cast<std::size_t>(row)](z) : others(z, k);
         };
         const auto holds = [&](int t, const std::vector<Real>& x) {
           slices += t > 0;
@@ -275,6 +411,7 @@ TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
   EXPECT_GT(certified, shifted ? 8 : 20);
   EXPECT_GT(slices, 500);
   EXPECT_GT(learned, 50);
+  EXPECT_GT(with_rest, 20);
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, AffineContainment,

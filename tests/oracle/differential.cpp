@@ -458,7 +458,8 @@ Counts RunLimits(const Options& options, long number, Tube& tube, std::mutex& ou
 // All that follows from one seed and one problem's number.
 Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& output) {
   const std::uint64_t start = options.seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number);
-  Random random(start), wide(~start), winds(start ^ 0x5851f42d4c957f2d), records(start ^ 0x2545f4914f6cdd1d);
+  Random random(start), wide(~start), winds(start ^ 0x5851f42d4c957f2d), records(start ^ 0x2545f4914f6cdd1d),
+      rests(start ^ 0x9e3779b97f4a7c15);
   Counts counts;
   counts.problems = 1;
   const bool absurd = random.Coin(0.25) && !options.texts && !options.kinks;
@@ -472,7 +473,7 @@ Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& o
   if (options.regions) problem->domain.inequalities.clear();  // paths have to stay in the domain
   if (winds.Coin(0.4)) Disturb(winds, *problem);
   if (options.affine)
-    static_cast<void>(MakeAffine(records, *problem));
+    static_cast<void>(MakeAffine(records, *problem, rests.Coin(0.4) ? &rests : nullptr));
   else if (records.Coin(0.3))
     problem = Recorded(records, *problem);
   if (absurd) Exaggerate(random, *problem);

@@ -89,6 +89,17 @@ TEST_F(LoadConfig, ReadsWhichRowsAreAffine) {
   EXPECT_EQ(error("{rows: [vx], columns: [vx]}\n  state_error: {px: 0.1}", only_vy), "");
   EXPECT_THAT(error("{rows: [vx], columns: [vx]}\n  state_error: {vx: 0.1}", only_vy),
               HasSubstr("declare a bound on that slope as declaration.lipschitz.vx.vx"));
+  const std::string rest = "{rows: [vx], columns: [vx], rest: {vx: {vy: 0.25, ax: 0.5}}}";
+  const Config with_rest = with(rest, only_vy);
+  EXPECT_FIELDS(with_rest.problem->declaration.affine, (Rest(2, 3), 0.25), (Rest(2, 4), 0.5), (rest.sum(), 0.75));
+  EXPECT_NE(with_rest.grounds.declaration, with("{rows: [vx], columns: [vx]}", only_vy).grounds.declaration);
+  EXPECT_NE(with_rest.grounds.declaration, with(Replaced(rest, "0.5", "0.75"), only_vy).grounds.declaration);
+  EXPECT_EQ(with(Replaced(rest, "0.25, ax: 0.5", "0"), only_vy).grounds.declaration,
+            with("{rows: [vx], columns: [vx]}", only_vy).grounds.declaration);
+  EXPECT_THAT(error(Replaced(rest, "rest: {vx", "rest: {vy"), only_vy),
+              HasSubstr("declaration.affine.rest.vy is none of declaration.affine.rows"));
+  EXPECT_THAT(error(rest + "\n  state_error: {vy: 0.1}", only_vy),
+              HasSubstr("declare a bound on that slope as declaration.lipschitz.vx.vy"));
 }
 
 TEST_F(LoadConfig, ReadsRegionsAndRefusesWhatIsNone) {

@@ -23,14 +23,14 @@ std::optional<Certificate> ConfirmedCertificate(const std::shared_ptr<const Prob
 }
 
 TEST(AffineCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheDataAreOthers) {
-  TracedRandom random(95), records(96);
-  int certified = 0, recorded = 0, changed = 0, steep = 0;
+  TracedRandom random(95), records(96), rests(97);
+  int certified = 0, recorded = 0, changed = 0, steep = 0, with_rest = 0;
   for (int trial = 0; trial < 80; ++trial) {
     SCOPED_TRACE("trial " + std::to_string(trial));
     const bool bicycle = random.Coin();
     const auto exact = AnyProblem(random, bicycle, random.Integer(6, 40));
     if (random.Coin()) Disturb(random, *exact);
-    static_cast<void>(MakeAffine(random, *exact));
+    static_cast<void>(MakeAffine(random, *exact, rests.Coin() ? &rests : nullptr));
     if (random.Coin(0.3)) Shift(random, *exact);
     const auto problem = records.Coin(0.4) ? RecordedAffine(records, *exact) : exact;
     const Verifier judge(problem, MethodOf(*problem));
@@ -40,6 +40,7 @@ TEST(AffineCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheDataAreOthers) {
     if (!certificate) continue;
     ++certified;
     recorded += problem->declaration.HasErrorInZ();
+    with_rest += problem->declaration.affine.rest.size() > 0;
     Certificate narrower = *certificate;
     const int row = problem->declaration.affine.rows[0];
     RecordedSlice& last = narrower.slices.back();
@@ -47,7 +48,8 @@ TEST(AffineCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheDataAreOthers) {
     EXPECT_NE(judge.Verify(narrower).status, Status::kConfirmed);
     // Slopes of almost nothing, which data that are not tell from what is declared.
     const auto flat = std::make_shared<Problem>(*problem);
-    for (const int l : problem->declaration.affine.columns) flat->declaration.lipschitz(row, l) = 1e-6;
+    for (int l = 0; l < problem->model->num_variables(); ++l)
+      if (problem->declaration.affine.DependsOn(row, l)) flat->declaration.lipschitz(row, l) = 1e-6;
     const Verdict of_flat = Verifier(flat, MethodOf(*flat)).Verify(*certificate);
     steep += of_flat.failure.what.find("are at most what is declared") != std::string::npos;
     EXPECT_FALSE(Certifier(flat).violation() && of_flat.status == Status::kConfirmed);
@@ -58,13 +60,16 @@ TEST(AffineCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheDataAreOthers) {
     other->transitions.x_next = problem->transitions.x_next;
     other->transitions.x_next(0, row) += 0.3;
     const Verdict of_other = Verifier(other, MethodOf(*other)).Verify(*certificate);
-    EXPECT_TRUE(problem->declaration.HasErrorInZ() || of_other.status != Status::kConfirmed);
+    // Errors or a rest may explain one step.
+    EXPECT_TRUE(problem->declaration.HasErrorInZ() || problem->declaration.affine.rest.size() > 0 ||
+                of_other.status != Status::kConfirmed);
     changed += of_other.failure.what.find("agrees with all data") != std::string::npos;
   }
   EXPECT_GT(certified, 15);
   EXPECT_GT(changed, 5);
   EXPECT_GT(recorded, 5);
   EXPECT_GT(steep, 5);
+  EXPECT_GT(with_rest, 5);
 }
 
 TEST(RegionalCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheRegionsAreNotDeclared) {
