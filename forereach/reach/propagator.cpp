@@ -182,19 +182,24 @@ FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const Step
     if (count == 0) continue;
     const std::span<const int> sloped(columns.data(), count);
     double* row = ArraysOf(next).mutable_row(k);
-    double magnitude = 0, slack = next.slack(k), spread = 0;
-    for (int j = 0; j < slice.num_generators(); ++j) {
-      magnitude = AddUp(magnitude, std::abs(row[j]));
+    Lanes magnitudes = AllLanes(0), spread = AllLanes(0);
+    for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
+      Lanes sum = LoadLanes(row + j);
+      magnitudes += Abs(sum);
       for (const int l : sloped) {
-        const double part = slope[ToSize(l)] * slice.generator(l, j);
-        magnitude = AddUp(magnitude, NextUp(std::abs(part)));
-        row[j] += part;
+        const Lanes part = AllLanes(slope[ToSize(l)]) * LoadLanes(&slice.padded_row(l)[j]);
+        magnitudes += Abs(part);
+        sum += part;
       }
-      spread += std::abs(row[j]);
+      StoreLanes(sum, row + j);
+      spread += Abs(sum);
     }
+    double slack = next.slack(k);
     for (const int l : sloped) slack = AddUp(slack, MulUp(std::abs(slope[ToSize(l)]), slice.slack(l)));
-    ArraysOf(next).mutable_slack(k) = AddUp(slack, PlainErrorUpper(magnitude, n + 2, n * slice.num_generators()));
-    sums.row[ToSize(k)] = spread;
+    // At most (n + 1) kMaxGenerators / 4 + 3 roundings of the sum of magnitudes.
+    const double magnitude = MulUp(Sum(magnitudes), 1 + kRelative);
+    ArraysOf(next).mutable_slack(k) = AddUp(slack, PlainErrorUpper(magnitude, n + 2, 2 * n * slice.num_generators()));
+    sums.row[ToSize(k)] = Sum(spread);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <queue>
 
 #include "forereach/numerics/directed.h"
+#include "forereach/numerics/lanes.h"
 #include "forereach/numerics/size.h"
 
 namespace forereach {
@@ -33,16 +34,43 @@ std::vector<double> TicksOf(double lower, double upper, const std::vector<double
   return ticks;
 }
 
-// The largest value on [x, y] of min(p + up (t - a), q + down (b - t)), p and q at the ends of a cell's side. NaN in
-// one of the terms behind the first leaves the others; in the first, it is the answer.
-double Tent(double p, double q, double up, double down, double a, double b, double x, double y) noexcept {
-  const double rising = p + up * ((up > 0 ? y : x) - a), falling = q + down * (b - (down > 0 ? x : y));
-  if (!(up > 0 && down > 0)) return std::min(rising, falling);
-  // Any share would do; with this one both terms are the same.
-  const double share = up == down ? 0.5 : down / (up + down);
-  const double crossing = share * p + (1 - share) * q + std::max(share * up, (1 - share) * down) * (b - a);
-  return std::min(std::min(rising, falling), crossing);
+// Four bounds at once: upper ones on r_k and on -r_k, then on both relative to a slope.
+FOREREACH_INLINE Lanes Tilted(double rise) { return Lanes{0, 0, rise, -rise}; }
+FOREREACH_INLINE Lanes AtNode(const std::array<double, 2>& values) {
+  using Pair [[gnu::vector_size(16)]] = double;
+  Pair pair;
+  __builtin_memcpy(&pair, values.data(), sizeof pair);
+  return __builtin_shufflevector(pair, pair, 0, 1, 0, 1);
 }
+
+// Of the part [lower, upper] of a cell's side [begin, end]: the largest value there of
+// min(p + up (t - begin), q + down (end - t)), p and q at the side's ends.
+struct Tent {
+  double slope = -1;  // none yet
+  Lanes up{}, down{}, share{}, rest{}, steepest{};
+  Lanes rising{}, falling{}, top{};  // over the part
+
+  FOREREACH_INLINE void SetSlope(double to, const Lanes& tilt) {
+    const Lanes zero = AllLanes(0);
+    slope = to;
+    up = AllLanes(slope) - tilt;
+    down = AllLanes(slope) + tilt;
+    // Any share would do; with this one both terms of the maximum are the same.
+    share = up == down ? AllLanes(0.5) : down / (up + down);
+    rest = AllLanes(1) - share;
+    steepest = (up > zero) & (down > zero) ? Max(share * up, rest * down) : AllLanes(kInfinity);
+  }
+  FOREREACH_INLINE void SetPart(double begin, double end, double lower, double upper) {
+    const Lanes zero = AllLanes(0);
+    rising = up * (up > zero ? AllLanes(upper - begin) : AllLanes(lower - begin));
+    falling = down * (down > zero ? AllLanes(end - lower) : AllLanes(end - upper));
+    top = steepest * AllLanes(end - begin);
+  }
+  // NaN in one of the terms before the last leaves the others; in the last, it is the answer.
+  FOREREACH_INLINE Lanes Largest(const Lanes& p, const Lanes& q) const {
+    return Min(share * p + rest * q + top, Min(q + falling, p + rising));
+  }
+};
 
 }  // namespace
 
@@ -82,7 +110,7 @@ RegionTable::RegionTable(const RegionGrid& grid, std::size_t row, std::span<cons
     axis.quantum = largest * width < kLargestTilt ? largest / kSlopes : 0;
     axis.least_width = width / static_cast<double>(axis.ticks.size() - 1) * kLeastStrips;
   }
-  for (std::vector<double>& values : values_) values.assign(axes_[0].ticks.size() * axes_[1].ticks.size(), kInfinity);
+  values_.assign(axes_[0].ticks.size() * axes_[1].ticks.size(), {kInfinity, kInfinity});
 }
 
 // False if no part of the box lies between the ticks.
@@ -114,12 +142,12 @@ double RegionTable::Cost(std::size_t a, std::size_t i, std::size_t j) const {
 }
 
 // Dijkstra: of two ways to a node the cheaper counts, each sum rounded up.
-void RegionTable::Spread(std::vector<double>& values, std::vector<Reached> reached) {
+void RegionTable::Spread(std::size_t side, const std::vector<Reached>& reached) {
   const auto is_farther = [](const Reached& a, const Reached& b) { return a.value > b.value; };
   std::priority_queue<Reached, std::vector<Reached>, decltype(is_farther)> queue(is_farther);
   const auto reach = [&](std::size_t node, double value) {
-    if (!(value < values[node])) return;
-    values[node] = value;
+    if (!(value < values_[node][side])) return;
+    values_[node][side] = value;
     largest_value_ = std::max(largest_value_, std::abs(value));
     queue.push({value, static_cast<std::uint32_t>(node)});
   };
@@ -128,7 +156,7 @@ void RegionTable::Spread(std::vector<double>& values, std::vector<Reached> reach
   while (!queue.empty()) {
     const auto [value, node] = queue.top();
     queue.pop();
-    if (value > values[node]) continue;
+    if (value > values_[node][side]) continue;
     const std::size_t i = node / columns, j = node % columns;
     if (i > 0) reach(node - columns, AddUp(value, Cost(0, i - 1, j)));
     if (i + 1 < rows) reach(node + columns, AddUp(value, Cost(0, i, j)));
@@ -141,9 +169,8 @@ void RegionTable::Add(std::span<const double> z, double floor, double ceiling) {
   RegionGrid::Box at;
   std::ranges::copy(z, at.lower.begin());
   std::ranges::copy(z, at.upper.begin());
-  std::array<Part, 2> part;
-  for (std::size_t a = 0; a < 2; ++a)
-    if (!Cover(axes_[a], at, part[a])) return;
+  Parts part;
+  if (!Cover(at, part)) return;
   const std::size_t i = part[0].first, j = part[1].first;
   const auto way = [&](std::size_t a, std::size_t tick) {
     const double away =
@@ -156,71 +183,102 @@ void RegionTable::Add(std::span<const double> z, double floor, double ceiling) {
       for (const std::size_t q : {j, j + 1})
         corners.push_back({AddUp(side == 0 ? ceiling : -floor, AddUp(way(0, p), way(1, q))),
                            static_cast<std::uint32_t>(NodeAt(p, q))});
-    Spread(values_[side], std::move(corners));
+    Spread(side, corners);
   }
   // Nine roundings at most, of terms that are no larger: docs/soundness.md, 3.20.
   error_ = AddUp(MulUp(16 * kUnitRoundoff, AddUp(largest_value_, MulUp(2, largest_way_))), 0x1p-1060);
 }
 
-// In the part of cell (i, j): along the first axis at both ends of the second, then along the second.
-double RegionTable::LargestIn(const std::vector<double>& values, std::size_t i, std::size_t j, const Part& first,
-                              const Part& second, const Tilt& tilt) const noexcept {
-  const double *p = &axes_[0].ticks[i], *q = &axes_[1].ticks[j];
-  const double lower = std::max(first.lower, p[0]), upper = std::min(first.upper, p[1]);
-  const std::array<double, 2>&slope = tilt.slope, &center = tilt.center;
-  const auto value = [&](std::size_t m, std::size_t n) {
-    return values[NodeAt(i + m, j + n)] - (slope[0] * (p[m] - center[0]) + slope[1] * (q[n] - center[1]));
-  };
-  const double across = axes_[0].slopes[CellAt(i, j)], along = axes_[1].slopes[CellAt(i, j)];
-  const auto largest = [&](std::size_t n) {
-    return Tent(value(0, n), value(1, n), across - slope[0], across + slope[0], p[0], p[1], lower, upper);
-  };
-  return Tent(largest(0), largest(1), along - slope[1], along + slope[1], q[0], q[1], std::max(second.lower, q[0]),
-              std::min(second.upper, q[1]));
-}
-
-Interval RegionTable::Enclose(const RegionGrid::Box& box, const Tilt& tilt) const noexcept {
-  std::array<Part, 2> part;
-  for (std::size_t a = 0; a < 2; ++a)
-    if (!Cover(axes_[a], box, part[a])) return Interval::Entire();
-  const Tilt opposite{{-tilt.slope[0], -tilt.slope[1]}, tilt.center};
-  std::array<double, 2> largest{-kInfinity, -kInfinity};
-  for (std::size_t i = part[0].first; i <= part[0].last; ++i)
-    for (std::size_t j = part[1].first; j <= part[1].last; ++j)
-      for (std::size_t side = 0; side < 2; ++side) {
-        const double here = LargestIn(values_[side], i, j, part[0], part[1], side == 0 ? tilt : opposite);
-        largest[side] =
-            std::max(largest[side], here < kInfinity ? here : kInfinity);  // what is no number bounds nothing
+// In each cell along the first axis at both ends of the second, then along the second. Neighbours with the same slope
+// have the same bounds where they meet.
+RegionTable::Bounds RegionTable::OverInline(const Parts& parts, const Tilt& tilt) const noexcept {
+  const Axis &first = axes_[0], &second = axes_[1];
+  const Lanes tilt_across = Tilted(tilt.slope[0]), tilt_along = Tilted(tilt.slope[1]), infinity = AllLanes(kInfinity);
+  Lanes largest = -infinity;
+  Tent along;
+  for (std::size_t i = parts[0].first; i <= parts[0].last; ++i) {
+    const double begin = first.ticks[i], end = first.ticks[i + 1];
+    const Lanes rise = tilt_across * AllLanes(begin - tilt.center[0]),
+                rise_at_end = tilt_across * AllLanes(end - tilt.center[0]);
+    Tent across;
+    Lanes near{}, far{};
+    const auto at = [&](std::size_t j) __attribute__((always_inline)) {
+      const Lanes more = tilt_along * AllLanes(second.ticks[j] - tilt.center[1]);
+      return across.Largest(AtNode(values_[NodeAt(i, j)]) - (rise + more),
+                            AtNode(values_[NodeAt(i + 1, j)]) - (rise_at_end + more));
+    };
+    for (std::size_t j = parts[1].first; j <= parts[1].last; ++j) {
+      const std::size_t cell = CellAt(i, j);
+      near = far;
+      if (first.slopes[cell] != across.slope) {
+        across.SetSlope(first.slopes[cell], tilt_across);
+        across.SetPart(begin, end, std::max(parts[0].lower, begin), std::min(parts[0].upper, end));
+        near = at(j);
       }
+      far = at(j + 1);
+      if (second.slopes[cell] != along.slope) along.SetSlope(second.slopes[cell], tilt_along);
+      const double left = second.ticks[j], right = second.ticks[j + 1];
+      along.SetPart(left, right, std::max(parts[1].lower, left), std::min(parts[1].upper, right));
+      const Lanes here = along.Largest(near, far);
+      largest = Max(here < infinity ? here : infinity, largest);  // what is no number bounds nothing
+    }
+  }
   double error = error_;
   for (std::size_t a = 0; a < 2; ++a) {
     const double width = axes_[a].ticks.back() - axes_[a].ticks.front();
     error = AddUp(error, MulUp(64 * kUnitRoundoff, MulUp(std::abs(tilt.slope[a]), width)));
   }
-  return {-AddUp(largest[1], error), AddUp(largest[0], error)};
+  return {{-AddUp(largest[1], error_), AddUp(largest[0], error_)},
+          {-AddUp(largest[3], error), AddUp(largest[2], error)},
+          tilt};
 }
 
-RegionTable::Tilt RegionTable::TiltOver(const RegionGrid::Box& box, std::span<const double> center) const noexcept {
+RegionTable::Bounds RegionTable::Over(const Parts& parts, const Tilt& tilt) const noexcept {
+  return Dispatch<&RegionTable::OverInline>(instructions_, *this, parts, tilt);
+}
+
+RegionTable::Bounds RegionTable::Enclose(const RegionGrid::Box& box, const Tilt& tilt) const noexcept {
+  Parts parts;
+  return Cover(box, parts) ? Over(parts, tilt) : Bounds{};
+}
+
+RegionTable::Bounds RegionTable::EncloseTilted(const RegionGrid::Box& box,
+                                               std::span<const double> center) const noexcept {
+  Parts parts;
+  return Cover(box, parts) ? Over(parts, TiltOver(parts, center, box)) : Bounds{};
+}
+
+RegionTable::Tilt RegionTable::TiltOver(const Parts& parts, std::span<const double> center,
+                                        const RegionGrid::Box& box) const noexcept {
+  // Of the part along an axis, the point nearest to z.
+  const auto point = [&](std::size_t a, double z) {
+    const Part& part = parts[a];
+    const double at = std::clamp(z, part.lower, part.upper);
+    const auto begin = axes_[a].ticks.begin(), from = begin + static_cast<std::ptrdiff_t>(part.first) + 1,
+               to = begin + static_cast<std::ptrdiff_t>(part.last) + 1;
+    const std::size_t strip = ToSize(std::upper_bound(from, to, at) - begin) - 1;
+    return Part{at, at, strip, strip};
+  };
+  Parts middle = parts;
+  for (std::size_t a = 0; a < 2; ++a)
+    if (axes_[a].variable >= 0) middle[a] = point(a, center[ToSize(axes_[a].variable)]);
   Tilt tilt{};
-  RegionGrid::Box at;
-  for (const Axis& axis : axes_)
-    if (axis.variable >= 0)
-      at.lower[ToSize(axis.variable)] = at.upper[ToSize(axis.variable)] = center[ToSize(axis.variable)];
   for (std::size_t a = 0; a < 2; ++a) {
-    const auto& [variable, ticks, slopes, quantum, least_width] = axes_[a];
-    if (!(quantum > 0)) continue;
-    const auto l = ToSize(variable);
-    if (!(box.upper[l] - box.lower[l] > least_width)) continue;
+    const Axis& axis = axes_[a];
+    if (!(axis.quantum > 0)) continue;
+    const auto l = ToSize(axis.variable);
+    if (!(box.upper[l] - box.lower[l] > axis.least_width)) continue;
     tilt.center[a] = center[l];
     const double away = kSecant * 0.5 * (box.upper[l] - box.lower[l]);
     const auto middle_at = [&](double z) {
-      at.lower[l] = at.upper[l] = z;
-      const Interval bounds = Enclose(at);
+      Parts at = middle;
+      at[a] = point(a, z);
+      const Interval bounds = Over(at, {}).plain;
       return 0.5 * bounds.lower + 0.5 * bounds.upper;
     };
     const double secant = (middle_at(center[l] + away) - middle_at(center[l] - away)) / (2 * away);
-    at.lower[l] = at.upper[l] = center[l];
-    if (std::isfinite(secant)) tilt.slope[a] = quantum * std::clamp(std::round(secant / quantum), -kSlopes, kSlopes);
+    if (std::isfinite(secant))
+      tilt.slope[a] = axis.quantum * std::clamp(std::round(secant / axis.quantum), -kSlopes, kSlopes);
   }
   return tilt;
 }

@@ -17,6 +17,7 @@ its expressions added at the end. */
 #include <span>
 #include <vector>
 
+#include "forereach/numerics/instruction_set.h"
 #include "forereach/residual/region_grid.h"
 
 namespace forereach {
@@ -43,15 +44,20 @@ class RegionTable final {
   struct Tilt {
     std::array<double, 2> slope, center;
   };
+  /** Bounds at every z in a box and the domain: on r_k(z), and on r_k(z) - sum_a slope_a (z_a - center_a). */
+  struct Bounds {
+    Interval plain = Interval::Entire(), tilted = Interval::Entire();
+    Tilt tilt{};
+  };
 
-  /** Bounds on r_k(z) - sum_a slope_a (z_a - center_a) at every z in the box and the domain. No heap, lock or
-  exception. Cost: some 20 ns for each cell that the box meets. @pre the tilt is zero or that of a box in the domain. */
-  [[nodiscard]] Interval Enclose(const RegionGrid::Box& box, const Tilt& tilt = {}) const noexcept;
+  /** Both in one pass. No heap, lock or exception. Cost: some 80 instructions for each cell that the box meets, with
+  AVX2. @pre the tilt is zero or that of a box in the domain. */
+  [[nodiscard]] Bounds Enclose(const RegionGrid::Box& box, const Tilt& tilt = {}) const noexcept;
 
-  /** By how much the middle of the bounds rises across the box, along each of its sides that is not far shorter than a
-  strip: whole parts, of which the largest slope has 250.7, so that who derives it again gets the same. @param center of
-  the box, of all variables of z. Any other slope were as sound. Cost: four times Enclose of a point. */
-  [[nodiscard]] Tilt TiltOver(const RegionGrid::Box& box, std::span<const double> center) const noexcept;
+  /** Relative to the slope by which the middle of the bounds rises across the box, along each of its sides that is not
+  far shorter than a strip: whole parts, of which the largest slope has 250.7, so that who derives it again gets the
+  same. @param center of the box, of all variables of z. Cost: that of Enclose, and of four points. */
+  [[nodiscard]] Bounds EncloseTilted(const RegionGrid::Box& box, std::span<const double> center) const noexcept;
 
  private:
   struct Axis {
@@ -67,22 +73,30 @@ class RegionTable final {
     std::size_t first, last;
   };
 
+  using Parts = std::array<Part, 2>;
+
   static bool Cover(const Axis& axis, const RegionGrid::Box& box, Part& part) noexcept;
+  [[nodiscard]] bool Cover(const RegionGrid::Box& box, Parts& parts) const noexcept {
+    return Cover(axes_[0], box, parts[0]) && Cover(axes_[1], box, parts[1]);
+  }
   [[nodiscard]] std::size_t CellAt(std::size_t i, std::size_t j) const { return i * (axes_[1].ticks.size() - 1) + j; }
   [[nodiscard]] std::size_t NodeAt(std::size_t i, std::size_t j) const { return i * axes_[1].ticks.size() + j; }
   [[nodiscard]] double Cost(std::size_t a, std::size_t i, std::size_t j) const;
-  [[nodiscard]] double LargestIn(const std::vector<double>& values, std::size_t i, std::size_t j, const Part& first,
-                                 const Part& second, const Tilt& tilt) const noexcept;
+  [[nodiscard]] Tilt TiltOver(const Parts& parts, std::span<const double> center,
+                              const RegionGrid::Box& box) const noexcept;
+  [[nodiscard]] Bounds Over(const Parts& parts, const Tilt& tilt) const noexcept;
+  [[nodiscard]] inline Bounds OverInline(const Parts& parts, const Tilt& tilt) const noexcept;
   struct Reached {
     double value;
     std::uint32_t node;
   };
-  void Spread(std::vector<double>& values, std::vector<Reached> reached);
+  void Spread(std::size_t side, const std::vector<Reached>& reached);
 
   std::array<Axis, 2> axes_;
-  std::array<std::vector<double>, 2> values_;   // of the nodes: upper bounds on r_k, and on -r_k
+  std::vector<std::array<double, 2>> values_;   // of the nodes: upper bounds on r_k, and on -r_k
   double largest_way_ = 0, largest_value_ = 0;  // along a side of a cell; of the bounds, in size
   double error_ = 0;
+  InstructionSet instructions_ = BestInstructionSet();
 };
 
 }  // namespace forereach

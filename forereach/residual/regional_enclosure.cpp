@@ -127,56 +127,50 @@ Interval RegionalEnclosure::Bound(std::size_t row, const RegionGrid::Box& to, In
 void RegionalEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept {
   others_.Enclose(query, bounds);
   const auto n = ToSize(query.slice.dim());
+  std::array<double, kMaxVariables> center;
   RegionGrid::Box hull;
   for (std::size_t l = 0; l < n; ++l) {
-    const double center = query.slice.center(static_cast<int>(l));
-    hull.lower[l] = SubDown(center, query.half_width[l]);
-    hull.upper[l] = AddUp(center, query.half_width[l]);
+    center[l] = query.slice.center(static_cast<int>(l));
+    hull.lower[l] = SubDown(center[l], query.half_width[l]);
+    hull.upper[l] = AddUp(center[l], query.half_width[l]);
   }
-  for (std::size_t l = 0; l < query.input.size(); ++l) hull.lower[n + l] = hull.upper[n + l] = query.input[l];
+  for (std::size_t l = 0; l < query.input.size(); ++l)
+    center[n + l] = hull.lower[n + l] = hull.upper[n + l] = query.input[l];
   grid_.Find(hull);
-  for (std::size_t i = 0; i < grid_.rows().size(); ++i) {
-    const auto k = ToSize(grid_.rows()[i]);
-    const Interval known{bounds.lower[k], bounds.upper[k]};
-    const Interval narrower = tables_[i] ? tables_[i]->Enclose(hull) : Bound(i, hull, known);
-    bounds.lower[k] = std::max(known.lower, narrower.lower);
-    bounds.upper[k] = std::min(known.upper, narrower.upper);
-  }
   for (std::size_t k = 0; k < n; ++k) {
+    // A declared bound cuts what observations say (soundness 3.20), which only narrows it.
     const double bound = grid_.LargestBound(RegionBound::kResidual, k, hull);
-    // After the observations, so that a declared bound cuts them, too (soundness 3.20).
     bounds.lower[k] = std::max(bounds.lower[k], -bound);
     bounds.upper[k] = std::min(bounds.upper[k], bound);
   }
-  Tilt(query, hull, bounds);
+  for (std::size_t i = 0; i < grid_.rows().size(); ++i) {
+    const auto k = ToSize(grid_.rows()[i]);
+    const Interval known{bounds.lower[k], bounds.upper[k]};
+    const RegionTable::Bounds found =
+        tables_[i] ? tables_[i]->EncloseTilted(hull, center) : RegionTable::Bounds{.plain = Bound(i, hull, known)};
+    bounds.lower[k] = std::max(known.lower, found.plain.lower);
+    bounds.upper[k] = std::min(known.upper, found.plain.upper);
+    Tilt(query, k, found, bounds);
+  }
 }
 
 // Relative to a slope where that is much narrower.
-void RegionalEnclosure::Tilt(const QuerySet& query, const RegionGrid::Box& hull,
+void RegionalEnclosure::Tilt(const QuerySet& query, std::size_t k, const RegionTable::Bounds& found,
                              ResidualBounds& bounds) const noexcept {
+  const std::array<double, 2>& slope = found.tilt.slope;
+  if (slope[0] == 0 && slope[1] == 0) return;
+  double width = found.tilted.upper - found.tilted.lower;
+  for (std::size_t a = 0; a < grid_.variables().size(); ++a)
+    if (slope[a] != 0) width += kOfSlope * 2 * std::abs(slope[a]) * query.half_width[ToSize(grid_.variables()[a])];
+  if (!(width < kNarrower * (bounds.upper[k] - bounds.lower[k]))) return;
   const auto n = ToSize(query.slice.dim());
-  std::array<double, kMaxVariables> center;
-  for (std::size_t l = 0; l < n; ++l) center[l] = query.slice.center(static_cast<int>(l));
-  std::ranges::copy(query.input, center.begin() + static_cast<std::ptrdiff_t>(n));
-  for (std::size_t i = 0; i < grid_.rows().size(); ++i) {
-    if (!tables_[i]) continue;
-    const auto k = ToSize(grid_.rows()[i]);
-    const RegionTable::Tilt tilt = tables_[i]->TiltOver(hull, center);
-    if (tilt.slope[0] == 0 && tilt.slope[1] == 0) continue;
-    const Interval band = tables_[i]->Enclose(hull, tilt);
-    double width = band.upper - band.lower;
-    for (std::size_t a = 0; a < grid_.variables().size(); ++a)
-      if (tilt.slope[a] != 0)
-        width += kOfSlope * 2 * std::abs(tilt.slope[a]) * query.half_width[ToSize(grid_.variables()[a])];
-    if (!(width < kNarrower * (bounds.upper[k] - bounds.lower[k]))) continue;
-    if (!bounds.has_slope)
-      for (std::size_t row = 0; row < n; ++row) std::fill_n(bounds.slope[row].begin(), n, 0.0);
-    bounds.has_slope = true;
-    bounds.lower[k] = band.lower;
-    bounds.upper[k] = band.upper;
-    for (std::size_t a = 0; a < grid_.variables().size(); ++a)
-      if (tilt.slope[a] != 0) bounds.slope[k][ToSize(grid_.variables()[a])] = tilt.slope[a];
-  }
+  if (!bounds.has_slope)
+    for (std::size_t row = 0; row < n; ++row) std::fill_n(bounds.slope[row].begin(), n, 0.0);
+  bounds.has_slope = true;
+  bounds.lower[k] = found.tilted.lower;
+  bounds.upper[k] = found.tilted.upper;
+  for (std::size_t a = 0; a < grid_.variables().size(); ++a)
+    if (slope[a] != 0) bounds.slope[k][ToSize(grid_.variables()[a])] = slope[a];
 }
 
 bool RegionalEnclosure::Keeps(int id) const { return std::ranges::find(kept_, id, &Kept::id) != kept_.end(); }

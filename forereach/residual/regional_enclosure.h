@@ -35,8 +35,8 @@ class RegionalEnclosure final : public ResidualEnclosure {
                     std::span<const double> domain_lower, std::span<const double> domain_upper,
                     const ResidualEnclosure& others);
 
-  /** Cost, in each row of RegionGrid::rows(): RegionTable::Enclose, or RegionGrid::CostUpper for each observation that
-  is kept and may narrow a bound. */
+  /** Cost, in each row of RegionGrid::rows(): RegionTable::EncloseTilted, or RegionGrid::CostUpper for each observation
+  that is kept and may narrow a bound. */
   void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
 
   /** Adds an observation, and tests it against those that are kept; the rest is not to be called meanwhile. Cost:
@@ -59,7 +59,8 @@ class RegionalEnclosure final : public ResidualEnclosure {
   };
 
   void AddTested(Kept one, std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
-  void Tilt(const QuerySet& query, const RegionGrid::Box& hull, ResidualBounds& bounds) const noexcept;
+  void Tilt(const QuerySet& query, std::size_t k, const RegionTable::Bounds& found,
+            ResidualBounds& bounds) const noexcept;
   [[nodiscard]] Interval Bound(std::size_t row, const RegionGrid::Box& to, Interval bounds) const noexcept;
   void Test(const Kept& one);
   void TestBounds(int id, const RegionGrid::Box& at, std::span<const double> lower, std::span<const double> upper);

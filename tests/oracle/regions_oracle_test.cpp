@@ -237,7 +237,7 @@ struct Tabled {
     RegionGrid::Box box;
     std::ranges::copy(from, box.lower.begin());
     std::ranges::copy(to, box.upper.begin());
-    return table.Enclose(box);
+    return table.Enclose(box).plain;
   }
 
   const std::vector<double> lower, upper;
@@ -275,7 +275,7 @@ TEST(RegionsOracle, TheTableHoldsRelativeToEverySlope) {
         tilt.slope[a] = random.Coin(0.3) ? random.Sign() * scene.declaration.lipschitz(0, l) : random.Uniform(-2, 2);
         tilt.center[a] = random.Uniform(box.lower[at], box.upper[at]);
       }
-      const Interval bounds = tabled.table.Enclose(box, tilt);
+      const auto [plain, bounds, same] = tabled.table.Enclose(box, tilt);
       for (int sample = 0; sample < 12; ++sample) {
         std::vector<Rational> z;
         for (std::size_t l = 0; l < d; ++l) {
@@ -303,17 +303,18 @@ TEST(RegionTable, TakesTheSlopeThatDataShow) {
   const auto slope_over = [&](double lower, double upper) {
     box.lower[0] = lower, box.upper[0] = upper;
     const std::vector<double> center{(lower + upper) / 2};
-    return tabled.table.TiltOver(box, center);
+    return tabled.table.EncloseTilted(box, center);
   };
-  EXPECT_EQ(slope_over(-1.5, -1).slope[0], 0);
-  const RegionTable::Tilt tilt = slope_over(0.5, 1);
+  EXPECT_EQ(slope_over(-1.5, -1).tilt.slope[0], 0);
+  const auto [plain, band, tilt] = slope_over(0.5, 1);
   EXPECT_EQ(tilt.slope[0], 1);
-  const Interval band = tabled.table.Enclose(box, tilt);
+  EXPECT_EQ(plain, tabled.table.Enclose(box).plain);
+  EXPECT_EQ(band, tabled.table.Enclose(box, tilt).tilted);
   EXPECT_LE(band.lower, 0.75);
   EXPECT_GE(band.upper, 0.75);
   EXPECT_LT(band.upper - band.lower, 1e-12) << "as steep as may be, from one to the other";
-  EXPECT_EQ(slope_over(0.75, 0.7505).slope[0], 0) << "too narrow";
-  EXPECT_EQ(slope_over(1.6, 2).slope[0], 0) << "as far above as below";
+  EXPECT_EQ(slope_over(0.75, 0.7505).tilt.slope[0], 0) << "too narrow";
+  EXPECT_EQ(slope_over(1.6, 2).tilt.slope[0], 0) << "as far above as below";
 }
 
 // By L it is far along x, and near along y to where x costs nothing.

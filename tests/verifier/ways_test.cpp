@@ -99,12 +99,10 @@ TEST(Nodes, BoundWhatTheTableSays) {
           center.emplace_back(middle[l]);
           half_width.push_back(Real(0.5) * (Real(box.upper[l]) - Real(box.lower[l])));
         }
-        const Interval bounds = table.Enclose(box);
+        const auto [bounds, band, tilt] = table.EncloseTilted(box, middle);
         const auto [least, most] = nodes.Over(ranges, {}, ranges);
         EXPECT_TRUE(CertainlyAtMost(Real(bounds.lower), least));
         EXPECT_TRUE(CertainlyAtMost(most, Real(bounds.upper)));
-        const RegionTable::Tilt tilt = table.TiltOver(box, middle);
-        const Interval band = table.Enclose(box, tilt);
         const auto [least_above, most_above] = nodes.Over(ranges, tilt.slope, center);
         EXPECT_TRUE(CertainlyAtMost(Real(band.lower), least_above));
         EXPECT_TRUE(CertainlyAtMost(most_above, Real(band.upper)));
