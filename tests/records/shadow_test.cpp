@@ -109,4 +109,19 @@ TEST_F(ShadowTest, OfFarMorePlansThanItRemembersTheLastCount) {
   EXPECT_EQ(summary.driven_certified.plans, 1);
 }
 
+// It takes no place of another plan, and what is driven is what was decided last.
+TEST_F(ShadowTest, APlanThatIsDecidedAgainTakesItsOwnPlace) {
+  const int most = static_cast<int>(ShadowTally::kMostPlans);
+  Decide(0, false, decision_t::REJECTED, decision_t::CAUSE_SHADOW);
+  for (int again = 0; again < most + 5; ++again) Decide(1, false, decision_t::REJECTED, decision_t::CAUSE_SHADOW);
+  Say(0, 0);
+  Say(1, 0);
+  Decide(1, false, decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE);
+  Say(1, 1);
+  Say(1, 2);
+  const ShadowSummary summary = Read();
+  EXPECT_FIELDS(summary, (certified, most + 6), (refusals(), 1), (states, 2),
+                (driven_certified, (ShadowSummary::Driven{2, 0})), (driven_refused, (ShadowSummary::Driven{1, 0})));
+}
+
 }  // namespace forereach::shadow_test
