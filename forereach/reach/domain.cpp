@@ -127,11 +127,15 @@ bool DomainTest::MeetsConstraintsWell(const double* center, const double* half_w
 
 DomainExit DomainTest::FindExitOf(const double* center, const double* half_width, std::span<const double> input,
                                   bool inside_box) const noexcept {
-  std::array<double, kMaxVariables> middle, reach{};
-  std::copy_n(center, num_states_, middle.begin());
-  std::ranges::copy(input, middle.begin() + num_states_);
-  std::copy_n(half_width, num_states_, reach.begin());
-  std::copy_n(input_error_.begin(), input.size(), reach.begin() + num_states_);
+  std::array<double, kMaxVariables> middle, reach;
+  for (std::size_t k = 0; k < num_states_; k += kLaneCount) {
+    StoreLanes(LoadLanes(center + k), &middle[k]);
+    StoreLanes(LoadLanes(half_width + k), &reach[k]);
+  }
+  for (std::size_t l = 0; l < input.size(); ++l) {
+    middle[num_states_ + l] = input[l];
+    reach[num_states_ + l] = input_error_[l];
+  }
   if (inside_box && MeetsConstraintsWell(middle.data(), reach.data())) return {};
   std::array<Interval, kMaxVariables> box;
   for (std::size_t l = 0; l < size_; ++l) box[l] = {SubDown(middle[l], reach[l]), AddUp(middle[l], reach[l])};
