@@ -30,9 +30,14 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Rows&
     constant_lower_[ToSize(k)] = row.floor;
     constant_upper_[ToSize(k)] = -row.negated_ceiling;
     if (row.distance.is_constant()) continue;
-    active_.push_back(k);
     BoundErrors(row, entries, observations, domain_lower, domain_upper);
     row.index = ObservationIndex(entries);
+    if (std::isfinite(row.error)) {
+      active_.push_back(k);
+    } else {  // nothing bounds the rounding
+      constant_lower_[ToSize(k)] = -kInfinity;
+      constant_upper_[ToSize(k)] = kInfinity;
+    }
   }
 }
 
@@ -71,56 +76,72 @@ using internal::Budget;
 using internal::Sides;
 
 struct LipschitzEnvelope::BoundSearch {
-  const Row& row;
-  const EnvelopeOptions& options;
-  Budget& budget;
-  FoundIn& found;
-  const Pack* tail = nullptr;  // blocks
-  std::size_t tail_count = 0;  // entries
+  const LipschitzEnvelope& envelope;
+  const QuerySet& set;
+  const EnvelopeTail* tail;
+  std::size_t tail_count;  // entries
+  ResidualBounds& bounds;
+
+  // One function for each metric and instruction set, so that each has the registers to itself.
+  template <class Metric>
+  void EncloseRow(std::size_t i) const {
+    const Row& row = envelope.rows_[i];
+    Budget budget{envelope.options_.max_leaf_visits, kPatternsPerLeaf * envelope.options_.max_leaf_visits};
+    const Sides best = Best(MetricOf<Metric>(row), i, row, budget);
+    // A cap on the search leaves a sound bound: any subset of the observations gives one.
+    bounds.lower[i] = best.floor - row.error;
+    bounds.upper[i] = -(best.negated_ceiling - row.error);
+    bounds.capped |= budget.capped;
+  }
 
   template <class Metric>
-  [[nodiscard]] Sides Run(const Metric& metric) const {
+  [[nodiscard]] Metric MetricOf(const Row& row) const {
+    const double margin = 4 * row.error;  // of bounds in the search, and for the bits that say which child they are of
+    if constexpr (Metric::kRefines)
+      return Metric(row.distance, set, margin, std::span<const double>(row.component_errors));
+    else
+      return Metric(row.distance, set, margin);
+  }
+
+  template <class Metric>
+  [[nodiscard]] Sides Best(const Metric& metric, std::size_t i, const Row& row, Budget& budget) const {
     const ObservationIndex& index = row.index;
     Sides best{-kInfinity, -kInfinity};
     if (index.num_blocks() <= MaxFlatBlocks<Metric>())
       best = ScanBlocks(metric, index.block(0), index.num_blocks(), best, budget);
     else
-      best = internal::TreeSearch<Metric>(metric, index, found, budget).Run();
-    if (tail_count > 0) best = ScanTail(metric, best);
+      best = internal::TreeSearch<Metric>(metric, index, bounds.found[i], budget).Run();
+    if (tail_count > 0) best = ScanTail(metric, tail->blocks(static_cast<int>(i)), best, budget);
     return {best.floor - metric.common(), best.negated_ceiling - metric.common()};
   }
 
   // The last block may be written to while it is read: only the lanes that count are.
   template <class Metric>
-  [[nodiscard]] Sides ScanTail(const Metric& metric, Sides best) const {
-    const std::size_t coordinates = row.distance.num_coordinates(), full = tail_count / kPackSize,
-                      rest = tail_count % kPackSize;
-    if (full > 0) best = ScanBlocks(metric, tail, full, best, budget);
-    if (rest == 0) return best;
+  [[nodiscard]] Sides ScanTail(const Metric& metric, const Pack* blocks, Sides best, Budget& budget) const {
+    const std::size_t coordinates = metric.coordinates(), full = tail_count / kPackSize, rest = tail_count % kPackSize;
     std::array<Pack, kMaxVariables + 2> last;
     for (std::size_t p = 0; p < coordinates + 2; ++p) {
       last[p] = Fill(p < coordinates ? 0 : -kInfinity);
-      for (std::size_t lane = 0; lane < rest; ++lane) last[p].set(lane, tail[full * (coordinates + 2) + p].at(lane));
+      for (std::size_t lane = 0; lane < rest; ++lane) last[p].set(lane, blocks[full * (coordinates + 2) + p].at(lane));
     }
-    return ScanBlocks(metric, last.data(), 1, best, budget);
+    const std::size_t end = rest > 0 ? 2 : 1;
+#pragma GCC unroll 1  // each call is inlined, which takes long to compile
+    for (std::size_t part = full > 0 ? 0 : 1; part < end; ++part)
+      best = ScanBlocks(metric, part == 0 ? blocks : last.data(), part == 0 ? full : 1, best, budget);
+    return best;
   }
 
   // The boxes of a tree say little in many coordinates, and an entry that is refined costs more than a block.
   template <class Metric>
   [[nodiscard]] std::size_t MaxFlatBlocks() const {
-    const auto most = ToSize(options.max_flat_blocks);
+    const auto most = ToSize(envelope.options_.max_flat_blocks);
     return Metric::kRefines ? std::min(8 * most, internal::kMaxRefinedBlocks) : most;
   }
 
-  // One function for each metric and instruction set, so that each has the registers to itself.
-  template <class Metric, class... More>
-  [[nodiscard]] Sides RunWith(const QuerySet& set, const More&... more) const {
-    return Run(Metric(row.distance, set, more...));
-  }
-  template <template <class> class Metric, class... More>
-  [[nodiscard]] Sides With(const QuerySet& set, const More&... more) const {
-    return Dispatch<&BoundSearch::RunWith<Metric<Pack>, More...>, &BoundSearch::RunWith<Metric<WidePack>, More...>>(
-        options.instructions, *this, set, more...);
+  template <template <class> class Metric>
+  void With(std::size_t i) const {
+    Dispatch<&BoundSearch::EncloseRow<Metric<Pack>>, &BoundSearch::EncloseRow<Metric<WidePack>>>(
+        envelope.options_.instructions, *this, i);
   }
   template <class P>
   using OneColumn = internal::PatternMetric<1, P>;
@@ -129,14 +150,13 @@ struct LipschitzEnvelope::BoundSearch {
   template <class P>
   using ThreeColumns = internal::PatternMetric<3, P>;
 
-  [[nodiscard]] Sides Best(const QuerySet& set) const {
-    const std::size_t columns = row.distance.columns().size();
-    const double margin = 4 * row.error;  // of bounds in the search, and for the bits that say which child they are of
-    if (columns == 1) return With<OneColumn>(set, margin);
-    if (columns == 2) return With<TwoColumns>(set, margin);
-    if (columns == 3) return With<ThreeColumns>(set, margin);
-    if (columns > ToSize(kMaxExactColumns)) return With<internal::HullMetric>(set, margin);
-    return With<internal::SignMetric>(set, margin, std::span<const double>(row.component_errors));
+  void Enclose(std::size_t i) const {
+    const std::size_t columns = envelope.rows_[i].distance.columns().size();
+    if (columns == 1) return With<OneColumn>(i);
+    if (columns == 2) return With<TwoColumns>(i);
+    if (columns == 3) return With<ThreeColumns>(i);
+    if (columns > ToSize(kMaxExactColumns)) return With<internal::HullMetric>(i);
+    With<internal::SignMetric>(i);
   }
 };
 
@@ -161,19 +181,8 @@ void LipschitzEnvelope::EncloseAll(const QuerySet& set, const EnvelopeTail* tail
       bounds.lower[i] = std::max(bounds.lower[i], tail->HighestFloor(k, count));
       bounds.upper[i] = std::min(bounds.upper[i], -tail->HighestNegatedCeiling(k, count));
     }
-  for (const int k : active_) {
-    const auto i = ToSize(k);
-    const Row& row = rows_[i];
-    Budget budget{options_.max_leaf_visits, kPatternsPerLeaf * options_.max_leaf_visits};
-    Sides best{-kInfinity, -kInfinity};
-    if (std::isfinite(row.error))
-      best = BoundSearch{row, options_, budget, bounds.found[i], tail ? tail->blocks(k) : nullptr, ToSize(count)}.Best(
-          set);
-    // Infinite errors leave no bound. A cap on the search leaves a sound one: any subset of the observations gives one.
-    bounds.lower[i] = best.floor - row.error;
-    bounds.upper[i] = -(best.negated_ceiling - row.error);
-    bounds.capped |= budget.capped;
-  }
+  const BoundSearch search{*this, set, tail, ToSize(count), bounds};
+  for (const int k : active_) search.Enclose(ToSize(k));
 }
 
 }  // namespace forereach

@@ -105,7 +105,7 @@ class LipschitzEnvelope final : public ResidualEnclosure {
 
   EnvelopeOptions options_;
   std::vector<Row> rows_;
-  std::vector<int> active_;                                             // the rows that are not constant
+  std::vector<int> active_;                                             // the rows that are searched
   std::array<double, kMaxStates> constant_lower_{}, constant_upper_{};  // the bounds of the others
   bool uses_hull_distance_ = false;
 };

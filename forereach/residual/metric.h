@@ -272,7 +272,7 @@ class SignMetric : public CenterDistance<P> {
       else
         signs.free[free] = l, signs.components[free++] = component;
     }
-    if (fixed == 0)
+    if (fixed == 0 && free > 0)
       --free, Extend(signs, 0, 0, signs.free[free], signs.components[free], 1);  // s and -s give the same value
     if (patterns < 1 << free) {
       capped = true;

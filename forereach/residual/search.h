@@ -88,15 +88,13 @@ requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blo
     }
   }
   std::array<double, 2> best{before.floor, before.negated_ceiling};
-  for (std::size_t side = 0; side < 2; ++side) {
-    const auto refine = [&](std::size_t b) {
+  for (std::size_t side = 0; side < 2; ++side)
+    for (std::size_t i = 0; i <= count; ++i) {
+      const std::size_t b = i == 0 ? first[side] : i - 1;
+      if (i > 0 && (b == first[side] || !(highest[side][b] > best[side]))) continue;
       const Pack* block = blocks + b * (coordinates + 2);
       best[side] = BestOfBlock(metric, block, block[coordinates + side], optimistic[side][b], best[side], budget);
-    };
-    refine(first[side]);
-    for (std::size_t b = 0; b < count; ++b)
-      if (b != first[side] && highest[side][b] > best[side]) refine(b);
-  }
+    }
   return {best[0], best[1]};
 }
 
