@@ -105,7 +105,7 @@ class Report:
                      ratio(self.cpu(f"{plain}/{scenario}/400"), self.cpu(f"certify/{scenario}/400")), least, then)
             for scenario, matrices, loops, then in (
                 ("bicycle", 85, 52, "safety and expansion, each 17 % of the instructions"),
-                ("point_mass", 150, 80, "smaller groups of observations: 2.5 of 13 are searched"))
+                ("point_mass", 150, 80, "two rows at once: one fills half the lanes"))
             for plain, spelling, least in (("straightforward", "", matrices),
                                            ("straightforward_loops", " by loops", loops))
         ] + [
