@@ -61,6 +61,11 @@ bool IsZeroColumn(const std::vector<Real>& column) {
   return std::ranges::all_of(column, [](const Real& entry) { return entry.IsZero(); });
 }
 
+// Whether it lies along no axis.
+bool IsMixed(const std::vector<Real>& column) {
+  return std::ranges::count_if(column, [](const Real& entry) { return !entry.IsZero(); }) > 1;
+}
+
 std::vector<Real> Axis(int dim, int k, const Real& length) {
   std::vector<Real> column(ToSize(dim));
   column[ToSize(k)] = length;
@@ -192,12 +197,14 @@ void BoxAllBut(Slice& slice, const std::vector<std::size_t>& kept) {
   slice = std::move(reduced);
 }
 
-// Girard's rule: keep the (order - 1) n columns of largest |g|_1 - |g|_inf, ties to the earlier, box the rest. Returns
-// what it may have cost the certifier, in doubles, to go another way.
-double Reduce(Slice& slice, int order, double remainder_rounding) {
+// Girard's rule: keep the (order - 1) n columns of largest |g|_1 - |g|_inf, ties to the earlier, box the rest. Columns
+// along axes, which a box holds as they are, do not count where steps may be off their times. Returns what it may have
+// cost the certifier, in doubles, to go another way.
+double Reduce(Slice& slice, int order, bool counts_axes, double remainder_rounding) {
   const auto n = ToSize(slice.dim()), kept = ToSize(order - 1) * n;
   const double tiny = std::ranges::any_of(slice.columns, MayUnderflow) ? 1 : 0;
-  if (slice.columns.size() <= ToSize(order) * n) return tiny;
+  const bool has_room = counts_axes || ToSize(std::ranges::count_if(slice.columns, IsMixed)) <= kept;
+  if (slice.columns.size() <= ToSize(order) * n && has_room) return tiny;
   const std::vector<Score> scores = Ranking(slice);
   const double close = kept > 0 ? CostOfConfusing(slice, scores[kept - 1], scores[kept], remainder_rounding) : 0;
   std::vector<std::size_t> largest;
@@ -208,12 +215,13 @@ double Reduce(Slice& slice, int order, double remainder_rounding) {
 }
 
 // As Reduce, by the choice that a record shows: none, if it has more columns that are not along an axis, the offset's
-// apart; else the (order - 1) n columns nearest to its first. False if it has fewer. Any choice gives a set that
-// contains the slice.
+// apart; else the (order - 1) n columns nearest to its first. What stays of the offset before is a column here alone.
+// False if it has fewer. Any choice gives a set that contains the slice.
 bool ReduceAs(Slice& slice, int order, const Eigen::MatrixXd& recorded, bool has_offset) {
   const auto n = ToSize(slice.dim()), kept = ToSize(order - 1) * n;
   const auto mixed = ((recorded.array() != 0).colwise().count() > 1).count() - (has_offset ? 1 : 0);
-  if (slice.columns.size() <= ToSize(order) * n || mixed > static_cast<Eigen::Index>(kept)) return true;
+  const std::size_t most = ToSize(order) * n + (has_offset ? 1 : 0);
+  if (slice.columns.size() <= most || mixed > static_cast<Eigen::Index>(kept)) return true;
   if (ToSize(recorded.cols()) < kept) return false;
   const std::vector<Eigen::VectorXd> rounded = slice.RoundedColumns();
   std::vector<std::size_t> chosen;
@@ -917,9 +925,9 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   const std::vector<Real> input_spread = InputSpread(query);
   std::vector<Real> unexpected = DisturbanceOver(query.acted);
   for (std::size_t k = 0; k < unexpected.size(); ++k) unexpected[k] += of_inputs_[k];
-  const Offset offset = OffsetOf(query, step, input_spread, unexpected, recorded);
+  Offset offset = OffsetOf(query, step, input_spread, unexpected, recorded);
   std::vector<Real> slack(ToSize(n));
-  Slice next = Image(query, step, offset, slack);
+  Slice next = Image(query, step, !recorded && options.reduce, offset, slack);
   const Real half(0.5);
   const Box& domain = problem_.domain.state;
   for (int k = 0; k < n; ++k) {  // diag(q)
@@ -942,7 +950,8 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   }
   const bool followed = recorded && ReduceAs(next, problem_.zonotope_order, recorded->generators, offset.recorded >= 0);
   if (options.reduce && !followed)
-    tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order, remainder_rounding_));
+    tube.ambiguity = std::max(tube.ambiguity,
+                              Reduce(next, problem_.zonotope_order, problem_.timing.error == 0, remainder_rounding_));
   if (!IsZeroColumn(offset.column)) {
     next.offset = static_cast<int>(next.columns.size());
     next.columns.push_back(offset.column);
@@ -1019,12 +1028,18 @@ TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const Step& step, cons
 }
 
 // <f0(c), (J + A) G>, A the step's slopes. With parameters that are intervals, the middles; `slack` then is set
-// to what they may be off, coordinate by coordinate, the slice's own slack included.
-Slice TubeMaker::Image(const Query& query, const Step& step, const Offset& offset, std::vector<Real>& slack) const {
+// to what they may be off, coordinate by coordinate, the slice's own slack included. What stays of the offset before is
+// a column, or `boxed` into the spread.
+Slice TubeMaker::Image(const Query& query, const Step& step, bool boxed, Offset& offset,
+                       std::vector<Real>& slack) const {
   const std::size_t n = slack.size(), num_columns = query.slice.columns.size() - query.slice.num_slack;
   Slice next;
   next.center = equations_.Value(query.center);
   const std::vector<FirstDerivative> jacobian = equations_.First(query.center);
+  const auto stay = [&](std::vector<Real> column) {  // of the offset before
+    for (std::size_t k = 0; k < n && boxed; ++k) offset.spread[k] += column[k].magnitude();
+    if (!boxed && !IsZeroColumn(column)) next.columns.push_back(std::move(column));
+  };
   for (std::size_t j = 0; j < query.slice.columns.size(); ++j) {
     const std::vector<Real>& column = query.slice.columns[j];
     std::vector<Real> image(n);
@@ -1034,14 +1049,17 @@ Slice TubeMaker::Image(const Query& query, const Step& step, const Offset& offse
     for (std::size_t k = 0; k < n; ++k)
       for (std::size_t l = 0; l < step.slopes[k].size(); ++l)
         if (const double slope = step.slopes[k][l]; slope != 0) image[k] += Real(slope) * column[l];
-    if (static_cast<int>(j) == query.slice.offset)
+    const bool is_offset = static_cast<int>(j) == query.slice.offset;
+    if (is_offset)
       for (std::size_t k = 0; k < n; ++k) image[k] -= offset.column[k];
     if (j >= num_columns)
       for (std::size_t k = 0; k < n; ++k) slack[k] += image[k].magnitude();
+    else if (is_offset)
+      stay(std::move(image));
     else if (!IsZeroColumn(image))
       next.columns.push_back(std::move(image));
   }
-  if (query.t > 0 && query.slice.offset < 0 && !IsZeroColumn(offset.column)) next.columns.push_back(offset.column);
+  if (query.t > 0 && query.slice.offset < 0) stay(offset.column);
   if (equations_.IsExact()) return next;
   for (std::size_t k = 0; k < n; ++k) {
     Round(next.center[k], slack[k]);

@@ -100,7 +100,7 @@ struct RecordedSet {
 
 /** Variants of the tube. All are sound; the options can make it tighter. */
 struct TubeOptions {
-  bool reduce = true;            ///< Reduce the order by the certifier's rule, or never.
+  bool reduce = true;            ///< Reduce the order and box offsets by the certifier's rule, or never.
   bool split_remainder = false;  ///< Also bound the Hessian over half the box: the integral remainder in two parts.
   KnownRows known = {};
   /** If not null: the record of each slice. Each step then starts from the recorded slice, and reduces as the record
@@ -183,7 +183,8 @@ class TubeMaker final {
                                         const std::vector<Real>& input_spread) const;
   [[nodiscard]] Offset OffsetOf(const Query& query, const Step& step, const std::vector<Real>& input_spread,
                                 const std::vector<Real>& unexpected, const RecordedSet* recorded) const;
-  [[nodiscard]] Slice Image(const Query& query, const Step& step, const Offset& offset, std::vector<Real>& slack) const;
+  [[nodiscard]] Slice Image(const Query& query, const Step& step, bool boxed, Offset& offset,
+                            std::vector<Real>& slack) const;
   [[nodiscard]] std::optional<Failure> Advance(Tube& tube, const Query& query, const TubeOptions& options) const;
 
   const Problem& problem_;

@@ -1,6 +1,7 @@
 #include "forereach/reach/propagator.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -136,10 +137,12 @@ struct Surroundings {
 // Adds up centers, half-widths and slacks of the successor, four coordinates at a time. False unless all are finite and
 // no envelope is inverted. The middles, the half-widths and the center itself are rounded; so are the sums.
 // @param negligible up to this length, an axis of the residual is of the size of rounding errors: part of the slack.
-// @param box_half_width is set to half the residual's width plus the disturbance: one axis for both.
+// @param of_remainder half-widths with axes of their own. @param box_half_width is set to half the residual's
+// width plus the disturbance: one axis for both.
 FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const StepError& error, const StepRecord& record,
-                           const ImageSums& sums, const double* disturbance, const double* negligible, Zonotope& next,
-                           double* box_half_width, double* next_half_width) noexcept {
+                           const ImageSums& sums, const double* of_remainder, const double* disturbance,
+                           const double* negligible, Zonotope& next, double* box_half_width,
+                           double* next_half_width) noexcept {
   // With room for what the reduction, which comes later, adds by its own inflation: docs/soundness.md, 2.
   const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
   return HoldsForFirst(
@@ -158,8 +161,7 @@ FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const Step
         if constexpr (kCountsRounding)
           slack = (slack + (LoadLanes(&error.value[k]) + (added > AllLanes(0) ? rounding : AllLanes(0)))) *
                   AllLanes(1 + kRelative);
-        const Lanes hull =
-            (LoadLanes(&sums.row[k]) + LoadLanes(&record.remainder.half_width[k]) + half + slack) * inflation;
+        const Lanes hull = (LoadLanes(&sums.row[k]) + LoadLanes(of_remainder + k) + half + slack) * inflation;
         StoreLanes(half, box_half_width + k);
         StoreLanes(center, ArraysOf(next).mutable_centers() + k);
         StoreLanes(slack, ArraysOf(next).mutable_slacks() + k);
@@ -201,6 +203,14 @@ FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const Step
     ArraysOf(next).mutable_slack(k) = AddUp(slack, PlainErrorUpper(magnitude, n + 2, 2 * n * slice.num_generators()));
     sums.row[ToSize(k)] = Sum(spread);
   }
+}
+
+// Appends d, the generator of the last boundary's offset.
+template <std::size_t kStates>
+FOREREACH_INLINE void AppendOffset(std::size_t n, const OffsetSpread& offset, Zonotope& next) {
+  const int last = next.num_generators();
+  ArraysOf(next).Extend<static_cast<int>(kStates)>(last + 1);
+  for (std::size_t k = 0; k < n; ++k) ArraysOf(next).mutable_row(static_cast<int>(k))[last] = offset.column[k];
 }
 
 // Why the successor could not be joined. An inverted envelope is a contradiction: its ends are bounds in real
@@ -291,6 +301,7 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   residual_.Enclose({slice, input, {half_width, n}}, record.envelope);
   ImageSums sums;
   model_.Map(expansion, error, slice, next, sums, instructions_);
+  if (record.envelope.has_slope) AddSlope(record.envelope, slice, next, sums);
   OffsetSpread offset;
   static constexpr std::array<double, kMaxStates> kNothing{};
   Disturbed disturbed;
@@ -309,18 +320,26 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
                          is_constant ? kNothing.data() : disturbed.of_model.data(),
                          disturbance,
                          is_first};
-    if (const int k = offsets_.Add(step, offset, next, sums, instructions_); k >= 0)
-      return {StepResult::Status::kNoFiniteEnclosure, {}, k};
+    offsets_.Add(step, offset, next, sums, instructions_);
   }
-  if (record.envelope.has_slope) AddSlope(record.envelope, slice, next, sums);
   std::array<double, kMaxStates> box_half_width;
-  const double* added = is_punctual ? disturbance : offset.half_width.data();
-  if (!Join(n, expansion, error, record, sums, added, negligible_.data(), next, box_half_width.data(), next_half_width))
+  const double* const added = is_punctual ? disturbance : offset.half_width.data();
+  const double* const of_remainder = is_punctual ? record.remainder.half_width.data() : kNothing.data();
+  if (!Join(n, expansion, error, record, sums, of_remainder, added, negligible_.data(), next, box_half_width.data(),
+            next_half_width))
     return Failed(record, next, next_half_width);
-  ArraysOf(next).mutable_axes_in_slack() = slice.axes_in_slack();
-  const unsigned lasting = is_punctual && !record.envelope.has_slope ? lasting_ : 0;
-  AppendAndReduce(next, record.remainder.half_width.data(), box_half_width.data(), order_, lasting, instructions_);
-  if (!is_punctual) StepOffsets::Append(offset, next, next_half_width);
+  AxesInSlack& held = ArraysOf(next).mutable_axes_in_slack();
+  if (is_punctual) {
+    held = slice.axes_in_slack();
+  } else {  // n axes count, whichever there are: docs/soundness.md, 3.15
+    unsigned missing = 0;
+    for (std::size_t k = 0; k < n; k += kLaneCount)
+      missing |= BitsOf(LoadLanes(&box_half_width[k]) == AllLanes(0)) << k;
+    held.count = std::popcount(missing & ((1u << n) - 1));
+  }
+  const unsigned lasting = record.envelope.has_slope ? 0 : lasting_;
+  AppendAndReduce(next, of_remainder, box_half_width.data(), order_, lasting, instructions_);
+  if (!is_punctual) AppendOffset<kStates>(n, offset, next);
   return {};
 }
 

@@ -16,34 +16,20 @@ namespace forereach {
 
 namespace {
 
-// Above the rounding of the sums and products below, that of the image's slack included: docs/soundness.md, 3.15.
+// Above the rounding of the sums and products below: docs/soundness.md, 3.15.
 constexpr double kOffsetRelative = 0x1p-43, kOffsetSmallest = 0x1p-1000;
-// Of the sum of a row: above the rounding of that sum, from which one entry is taken and put back.
+// Of the sum of a row: above the rounding of that sum, from which one entry is taken.
 constexpr double kSumRelative = 0x1p-46;
+
+constexpr std::array<double, kMaxStates> kZeros{};
 
 // sum_l |slope_kl| r_l where the residual's bounds have a slope: what they leave out.
 [[gnu::noinline]] void AddSlopes(const StepSoFar& step, std::array<double, kMaxStates>& most) noexcept {
+  most = {};
   for (int k = 0; k < step.slice.dim(); ++k)
     for (int l = 0; l < step.slice.dim(); ++l)
       most[ToSize(k)] = AddUp(most[ToSize(k)],
                               MulUp(std::abs(step.residual.slope[ToSize(k)][ToSize(l)]), step.half_width[ToSize(l)]));
-}
-
-// Subtracts `column` from the last generator of an image, and sets its sums anew: docs/soundness.md, 3.15.
-FOREREACH_INLINE void SubtractFromLast(const double* column, Zonotope& image, ImageSums& sums) {
-  const std::size_t n = ToSize(image.dim()), last = ToSize(image.num_generators()) - 1;
-  for (std::size_t k = 0; k < n; k += kLaneCount) {
-    const auto at = [&](std::size_t i) __attribute__((always_inline))->double& {
-      return ArraysOf(image).mutable_row(static_cast<int>(std::min(k + i, n - 1)))[last];
-    };
-    const Lanes entries{at(0), at(1), at(2), at(3)};
-    const Lanes moved = FirstLanes(entries - LoadLanes(column + k), n - k, 0), after = Abs(moved);
-    const Lanes sum = LoadLanes(&sums.row[k]);
-    StoreLanes(((sum - Abs(entries)) + after) + AllLanes(kSumRelative) * sum, &sums.row[k]);
-    StoreLanes(LoadLanes(image.slacks() + k) + AllLanes(2 * kUnitRoundoff) * after,
-               ArraysOf(image).mutable_slacks() + k);
-    for (std::size_t i = 0; i < std::min(kLaneCount, n - k); ++i) at(i) = moved[i];
-  }
 }
 
 }  // namespace
@@ -110,9 +96,14 @@ bool StepOffsets::AddSlopesOf(const Program& program, int k) {
   return has_own;
 }
 
-int StepOffsets::Add(const StepSoFar& step, OffsetSpread& spread, Zonotope& image, ImageSums& sums,
-                     InstructionSet instructions) const noexcept {
-  return Dispatch<&StepOffsets::AddInline>(instructions, *this, step, spread, image, sums);
+void StepOffsets::Add(const StepSoFar& step, OffsetSpread& spread, Zonotope& image, ImageSums& sums,
+                      InstructionSet instructions) const noexcept {
+  const auto add = [&]<std::size_t kStates>() {
+    Dispatch<&StepOffsets::AddInline<kStates>>(instructions, *this, step, spread, image, sums);
+  };
+  if (states_ == 6) return add.operator()<6>();
+  if (states_ == 4) return add.operator()<4>();
+  return add.operator()<0>();
 }
 
 void StepOffsets::EncloseByIntervals(std::span<const PlainInterval> hull, PerState& middle,
@@ -129,58 +120,51 @@ void StepOffsets::EncloseByIntervals(std::span<const PlainInterval> hull, PerSta
 }
 
 // Of each state, f0(z) - z lies within `reach` of p = f0~ - c + m, the middle of E g is share p, and d is that rounded.
-// `away` is sum_l |J - I|_kl r_l.
-int StepOffsets::AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope& image,
-                           ImageSums& sums) const noexcept {
-  static constexpr PerState kNothing{};
-  PerState middle, around, away{}, sloped{};
+// `away` is sum_l |J - I|_kl r_l, and `left` what stays of the offset before.
+template <std::size_t kStates>
+void StepOffsets::AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope& image,
+                            ImageSums& sums) const noexcept {
+  const std::size_t n = kStates > 0 ? kStates : states_, last = ToSize(image.num_generators()) - 1;
+  PerState middle, around, away, sloped;
   const bool is_by_step = by_intervals_.empty();
   if (!is_by_step) middle = around = {}, EncloseByIntervals(step.hull, middle, around);
-  const double* const middles = is_by_step ? kNothing.data() : middle.data();
-  const double* const arounds = is_by_step ? kNothing.data() : around.data();
+  const double* const middles = is_by_step ? kZeros.data() : middle.data();
+  const double* const arounds = is_by_step ? kZeros.data() : around.data();
+  if (step.residual.has_slope) AddSlopes(step, sloped);
+  const double* const slopes = step.residual.has_slope ? sloped.data() : kZeros.data();
+  for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(AllLanes(0), &away[k]);
   for (const auto& [row, column, entry, own] : slopes_)
     away[row] += std::abs(step.expansion.jacobian[entry] - own) * step.half_width[column];
-  if (step.residual.has_slope) AddSlopes(step, sloped);
   const Lanes ends = AllLanes(step.is_first ? 1 : 2);  // |j_{t+1} - j_t| / E at most
   const PerState& growths = step.is_first ? growth_once_ : growth_twice_;
-  const auto is_finite = [&](std::size_t k) __attribute__((always_inline)) {
+  for (std::size_t k = 0; k < n; k += kLaneCount) {
     const Lanes value = LoadLanes(&step.expansion.value[k]), center = LoadLanes(step.slice.centers() + k),
                 moved = LoadLanes(&step.remainder.center[k]), by_step = LoadLanes(&by_step_[k]);
     const Lanes column = by_step * ((value - center) + moved) + LoadLanes(middles + k);
     const Lanes most =
-        Max(Abs(LoadLanes(&step.residual.lower[k])), Abs(LoadLanes(&step.residual.upper[k]))) + LoadLanes(&sloped[k]);
-    const Lanes reach = LoadLanes(&away[k]) + LoadLanes(&step.error.value[k]) + LoadLanes(image.slacks() + k) +
-                        LoadLanes(&step.remainder.half_width[k]) +
-                        AllLanes(4 * kUnitRoundoff) * (Abs(value) + Abs(center) + Abs(moved)) +
+        Max(Abs(LoadLanes(&step.residual.lower[k])), Abs(LoadLanes(&step.residual.upper[k]))) + LoadLanes(slopes + k);
+    const Lanes remainder = LoadLanes(&step.remainder.half_width[k]);
+    const Lanes reach = LoadLanes(&away[k]) + LoadLanes(&step.error.value[k]) + LoadLanes(&step.error.image[k]) +
+                        remainder + AllLanes(4 * kUnitRoundoff) * (Abs(value) + Abs(center) + Abs(moved)) +
                         LoadLanes(step.of_inputs + k);
+    Lanes left = AllLanes(0), sum = LoadLanes(&sums.row[k]);
+    if (!step.is_first) {
+      const auto at = [&](std::size_t i) __attribute__((always_inline)) {
+        return k + i < n ? image.padded_row(static_cast<int>(k + i))[last] : 0;
+      };
+      const Lanes image_of_last{at(0), at(1), at(2), at(3)};
+      left = Abs(image_of_last - column);
+      sum = (sum - Abs(image_of_last)) + AllLanes(kSumRelative) * sum;
+    }
     const Lanes growth = LoadLanes(&growths[k]), w = LoadLanes(step.unexpected + k);
     const Lanes off = by_step * reach + AllLanes(4 * kUnitRoundoff) * Abs(column) + LoadLanes(arounds + k);
-    Lanes added = ends * (off + LoadLanes(&declared_[k])) + growth * (most + w);
-    added = growth > AllLanes(0) ? added * AllLanes(1 + kOffsetRelative) + AllLanes(kOffsetSmallest) : added;
+    Lanes added = ends * (off + LoadLanes(&declared_[k])) + growth * (most + w) + left + remainder;
+    added = added > AllLanes(0) ? added * AllLanes(1 + kOffsetRelative) + AllLanes(kOffsetSmallest) : added;
+    StoreLanes(sum + Abs(column), &sums.row[k]);
     StoreLanes(column, &spread.column[k]);
     StoreLanes(LoadLanes(step.disturbance + k) + added, &spread.half_width[k]);
-    return Abs(column) + added < AllLanes(kInfinity);
-  };
-  const bool all_finite = HoldsForFirst(states_, is_finite);
-  if (!step.is_first) SubtractFromLast(spread.column.data(), image, sums);
-  if (all_finite) return -1;
-  for (std::size_t k = 0; k < states_; ++k)
-    if (!(std::abs(spread.column[k]) + spread.half_width[k] < kInfinity)) return static_cast<int>(k);
-  return 0;
-}
-
-void StepOffsets::Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept {
-  const auto last = ToSize(next.num_generators());
-  ArraysOf(next).Reset(next.dim(), next.num_generators() + 1);
-  for (int k = 0, n = next.dim(); k < n; ++k) {
-    double* const row = ArraysOf(next).mutable_row(k);
-    if (last % kLaneCount == 0) StoreLanes(AllLanes(0), row + last);  // otherwise it is padding
-    row[last] = spread.column[ToSize(k)];
   }
-  for (std::size_t k = 0; k < ToSize(next.dim()); k += kLaneCount) {
-    const Lanes sum = LoadLanes(half_width + k) + Abs(LoadLanes(&spread.column[k]));
-    StoreLanes(sum * AllLanes(1 + 4 * kUnitRoundoff), half_width + k);
-  }
+  if (!step.is_first) ArraysOf(image).Truncate<static_cast<int>(kStates)>(static_cast<int>(last));
 }
 
 }  // namespace forereach

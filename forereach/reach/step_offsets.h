@@ -6,9 +6,9 @@ Boundary t is at the time s_t = s_0 + t dt + j_t, with j_0 = 0 and |j_t| <= E, s
 residual and disturbance change by no more than the power q of the duration does (StepRate::Growth). With d some double
 next to E g, j_t = E b_t, (j_{t+1} - j_t) g in d b_{t+1} - d b_t + [-1, 1] |b_{t+1} - b_t| |E g - d|. Where the end of a
 state moves in proportion to the duration (StepRate::IsProportional), g = (f0(x_t, u_t) - x_t) / dt, which the step has
-bounded already. The last generator of X_t, t > 0, is that of b_t. The step subtracts d from its image and appends d as
-the generator of b_{t+1}, so offsets do not add up: what stays of them is how g changes from step to step.
-docs/soundness.md, 3.15. */
+bounded already. The last generator d' of X_t, t > 0, is that of b_t. The step takes it out of the image, counts
+|J d' - d| as a half-width, and appends d as the generator of b_{t+1}, so offsets do not add up: what stays of them is
+how g changes from step to step. docs/soundness.md, 3.15. */
 #pragma once
 
 #include <array>
@@ -22,6 +22,7 @@ docs/soundness.md, 3.15. */
 #include "forereach/dynamics/step_rate.h"
 #include "forereach/numerics/instruction_set.h"
 #include "forereach/numerics/lanes.h"
+#include "forereach/numerics/limits.h"
 #include "forereach/residual/enclosure.h"
 #include "forereach/sets/eigen.h"
 
@@ -33,8 +34,9 @@ class Zonotope;
 
 /** What the offsets of both ends add to one step. */
 struct OffsetSpread {
-  std::array<double, kMaxStates> column;      ///< d
-  std::array<double, kMaxStates> half_width;  ///< Bounds on all that is added without correlation.
+  std::array<double, kMaxStates> column;  ///< d
+  /** Bounds on all that is added without correlation: disturbance and remainder, too. */
+  std::array<double, kMaxStates> half_width;
 };
 
 /** A step up to the image of its slice, from which follows what the offsets add. */
@@ -61,15 +63,12 @@ class StepOffsets final {
   /** Nothing is ever off: E = 0. */
   [[nodiscard]] bool AreZero() const { return error_ == 0; }
 
-  /** Sets `spread`; unless the step is the first, subtracts d from the last generator of the image, adds the rounding
-  to its slack, and updates `sums`. Returns the first coordinate that has no finite bound, -1 if all have. Allocates
-  nothing. @param image what Map made of the slice, and nothing else yet. Cost O(entries of J), and the operations of
-  the rates that the step itself does not bound. */
-  [[nodiscard]] int Add(const StepSoFar& step, OffsetSpread& spread, Zonotope& image, ImageSums& sums,
-                        InstructionSet instructions) const noexcept;
-
-  /** Appends d as a generator, and adds it to the half-widths of the hull. */
-  static void Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept;
+  /** Sets `spread`, adds |d| to the sums of rows, and unless the step is the first, takes the last generator out of the
+  image. What has no finite bound is infinite or NaN in them. Allocates nothing. @param image what the slice's
+  generators have become, and nothing else yet. Cost O(entries of J), and the operations of the rates that the step
+  itself does not bound. */
+  void Add(const StepSoFar& step, OffsetSpread& spread, Zonotope& image, ImageSums& sums,
+           InstructionSet instructions) const noexcept;
 
  private:
   using PerState = std::array<double, kMaxStates>;
@@ -82,8 +81,9 @@ class StepOffsets final {
 
   // False if J has no entry for state k's own.
   [[nodiscard]] bool AddSlopesOf(const Program& program, int k);
-  [[nodiscard]] FOREREACH_INLINE int AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope& image,
-                                               ImageSums& sums) const noexcept;
+  template <std::size_t kStates>  // a constant number of states, or 0
+  FOREREACH_INLINE void AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope& image,
+                                  ImageSums& sums) const noexcept;
   void EncloseByIntervals(std::span<const PlainInterval> hull, PerState& middle, PerState& reach) const noexcept;
 
   double error_, period_ = 0;

@@ -218,6 +218,29 @@ TEST(StepOffsets, AddUpOnlyWhereNothingSaysHowTheyAreRelated) {
   for (const int t : {1, 2, 8}) EXPECT_NEAR(half_width(t, 0), (2 * t - 1) * 2 * 0x1p-6, 1e-11) << t;
 }
 
+// v' = u from 0 to 1: v after two steps is what the second one lasted, whose ends are both off; x then is that of v =
+// 0.
+TEST(StepOffsets, CountHowTheRateChangesFromStepToStep) {
+  Problem problem = WorldOf(Equation("v", Integrator::kEuler), Within(Vec({9, 9})), Within(Vec({1})));
+  problem.projection = Eigen::MatrixXd::Identity(1, 2);
+  problem.transitions = {Eigen::MatrixXd::Zero(1, 3), Eigen::MatrixXd::Zero(1, 2)};
+  problem.timing.error = 0x1p-6;
+  const Certifier certifier(std::make_shared<Problem>(problem));
+  const Eigen::MatrixXd controls = Eigen::RowVector3d(0, 1, 1);
+  Tube tube;
+  ASSERT_EQ(
+      certifier.Certify({controls.data(), 1, 3, 1}, Zonotope::FromBox(Vec({0, 0}), Vec({0, 0})), {}, tube).outcome,
+      Outcome::kCertified);
+  EXPECT_NEAR(tube.half_width(1)[1], 0, 1e-11);
+  for (const int t : {2, 3}) {
+    const Interval v = tube.hull(t, 1);
+    EXPECT_GE(v.upper, (t - 1) * 0.125 + 2 * 0x1p-6) << t;
+    EXPECT_LE(v.upper, (t - 1) * 0.125 + 2 * 0x1p-6 + 1e-11) << t;
+    EXPECT_LE(v.lower, (t - 1) * 0.125 - 2 * 0x1p-6) << t;
+  }
+  EXPECT_NEAR(tube.half_width(2)[0], 0, 1e-11);
+}
+
 // Where a declaration is false, a motion leaves the slice, and the guard sees that: x is off by a residual of 1/16 at
 // dt that grows with the square of the duration, and no faster; software sets v, and time does not move it on.
 TEST(StepOffsets, WhatMovesFasterThanDeclaredLeavesTheSlice) {
