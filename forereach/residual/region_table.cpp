@@ -254,9 +254,8 @@ RegionTable::Tilt RegionTable::TiltOver(const Parts& parts, std::span<const doub
   const auto point = [&](std::size_t a, double z) {
     const Part& part = parts[a];
     const double at = std::clamp(z, part.lower, part.upper);
-    const auto begin = axes_[a].ticks.begin(), from = begin + static_cast<std::ptrdiff_t>(part.first) + 1,
-               to = begin + static_cast<std::ptrdiff_t>(part.last) + 1;
-    const std::size_t strip = ToSize(std::upper_bound(from, to, at) - begin) - 1;
+    std::size_t strip = part.first;
+    while (strip < part.last && axes_[a].ticks[strip + 1] <= at) ++strip;
     return Part{at, at, strip, strip};
   };
   Parts middle = parts;
