@@ -623,11 +623,10 @@ class Examination final {
   // Which part of the residual's bounds is the widest, compared with the domain.
   [[nodiscard]] std::string NarrowerTube(const Tube& tube) const {
     if (tube.length() == 0) return "";
-    const ResidualBounds& bounds = tube.step(tube.length() - 1).envelope;
     std::size_t widest = 0;
     double share = 0, half = 0;
     for (std::size_t k = 0; k < result_.states.size(); ++k) {
-      const double width = (bounds.upper[k] - bounds.lower[k]) / 2;
+      const double width = ResidualOver(tube, tube.length() - 1, static_cast<int>(k)).HalfWidthUpper();
       if (const double of = width / std::max(Upper(k) - Lower(k), 1e-300); of > share)
         widest = k, share = of, half = width;
     }

@@ -25,9 +25,9 @@ void AddBinding(const Tube& tube, PageDetail& detail) {
     detail.hull_lower.push_back(hull.lower);
     detail.hull_upper.push_back(hull.upper);
     if (t == tube.length()) continue;
-    const ResidualBounds& envelope = tube.step(t).envelope;
-    detail.envelope_lower.push_back(envelope.lower[ToSize(k)]);
-    detail.envelope_upper.push_back(envelope.upper[ToSize(k)]);
+    const Interval residual = ResidualOver(tube, t, k);
+    detail.envelope_lower.push_back(residual.lower);
+    detail.envelope_upper.push_back(residual.upper);
   }
 }
 

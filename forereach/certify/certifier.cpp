@@ -303,7 +303,7 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclo
       rates_(*problem_),
       propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
                   problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing, {},
-                  problem_->declaration.growing, safety_.placement().SeparableStates()) {
+                  problem_->declaration.growing, SeparableStates(*problem_, safety_.placement())) {
   // Soundness 3.18 bounds what an input's error does to the residual by L, and nobody says that this residual keeps L.
   forereach::Require(problem_->declaration.input_error.isZero(0),
                      "declaration: input_error counts by lipschitz, which does not bound a residual of another kind");

@@ -37,7 +37,7 @@ class Certifier final {
   explicit Certifier(std::shared_ptr<const Problem> problem);
 
   /** Certifies with the bounds of `residual`: a certificate is as sound as they are. Of the problem's declaration only
-  the disturbance is read, and transitions and limits on observations are not; an input_error is refused. There are no
+  the disturbance and what may have slopes (regions, affine rows) are read; an input_error is refused. There are no
   observations and there is no violation.
   @param residual must outlive the certifier. Errors as above, for the other parts of the problem. */
   Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual);

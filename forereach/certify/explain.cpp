@@ -151,6 +151,15 @@ std::string ExplainUnbounded(const Decision& decision, const NominalModel& model
 
 }  // namespace
 
+Interval ResidualOver(const Tube& tube, int t, int k) {
+  const ResidualBounds& bounds = tube.step(t).envelope;
+  const std::span<const double> half_width = tube.half_width(t);
+  double spread = 0;
+  for (std::size_t l = 0; l < half_width.size() && bounds.has_slope; ++l)
+    spread = AddUp(spread, MulUp(std::abs(bounds.slope[ToSize(k)][l]), half_width[l]));
+  return Interval(bounds.lower[ToSize(k)], bounds.upper[ToSize(k)]) + Interval(-spread, spread);
+}
+
 std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest,
                                std::span<const Obstacle> obstacles) {
   const double error = problem.timing.error;

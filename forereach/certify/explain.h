@@ -7,6 +7,7 @@
 
 #include "forereach/certify/decision.h"
 #include "forereach/certify/problem.h"
+#include "forereach/numerics/interval.h"
 #include "forereach/safety/obstacle.h"
 
 namespace forereach {
@@ -23,6 +24,10 @@ and are rounded so that the sentence stays true: a clearance down, a depth up.
 operation of the model's text that meets its kink or pole (dynamics/unbounded.h). Not for the certify step. */
 [[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem, std::span<const Obstacle> obstacles,
                                   const Plan& plan, const Tube& tube);
+
+/** Contains r_k(z) for every admissible residual and every z over slice t: what step t took for it, with what a slope
+adds over the slice. @pre t < tube.length(). */
+[[nodiscard]] Interval ResidualOver(const Tube& tube, int t, int k);
 
 /** The closest approach of a certified plan, as Decision has it. */
 struct ClosestApproach {

@@ -2,6 +2,7 @@
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/explain.h"
 #include "tests/worlds.h"
 
 namespace forereach::given_enclosure_test {
@@ -61,6 +62,20 @@ TEST_F(GivenEnclosure, ASlopeContractsWhatAnIntervalCannot) {
   EXPECT_EQ(Certify(Velocities(-0.5, 0)).outcome, Outcome::kCertified);
   for (int t = 0; t <= 8; ++t) EXPECT_NEAR(tube_.half_width(t)[2], 0.0625 * std::pow(0.5, t), 1e-12);
   EXPECT_EQ(Certify(Velocities(2, 0)).outcome, Outcome::kDomain);  // threefold in each step
+}
+
+TEST_F(GivenEnclosure, AResidualOverASliceHasWhatItsSlopeAddsThere) {
+  for (const double slope : {0.0, -0.5, 0.25}) {
+    static_cast<void>(Certify(Velocities(slope, 0.125)));
+    for (const int t : {0, 1}) {
+      const double most = 0.125 + std::abs(slope) * tube_.half_width(t)[2];
+      const Interval residual = ResidualOver(tube_, t, 2);
+      EXPECT_FIELDS(residual, (lower, -residual.upper));
+      EXPECT_GE(residual.upper, most);
+      EXPECT_LE(residual.upper, most + 1e-15);
+    }
+    EXPECT_EQ(ResidualOver(tube_, 1, 0), Interval(0.0)) << "no slope in this row";
+  }
 }
 
 // In a step that lasts a quarter longer the residual, which is up to half of the width, grows by 1.25^2 - 1 of itself.
