@@ -58,7 +58,8 @@ struct Tent {
     // Any share would do; with this one both terms of the maximum are the same.
     share = up == down ? AllLanes(0.5) : down / (up + down);
     rest = AllLanes(1) - share;
-    steepest = (up > zero) & (down > zero) ? Max(share * up, rest * down) : AllLanes(kInfinity);
+    const LaneMask crosses = (up > zero) & (down > zero);
+    steepest = crosses ? Max(share * up, rest * down) : AllLanes(kInfinity);
   }
   FOREREACH_INLINE void SetPart(double begin, double end, double lower, double upper) {
     const Lanes zero = AllLanes(0);
