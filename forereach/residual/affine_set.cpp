@@ -21,6 +21,7 @@ constexpr int kMostSteps = 400, kMostStepsOfAQuery = 24;
 constexpr int kSamples = 32;  // of the domain, and of the data
 // Up to this many observations a query looks at all of them.
 constexpr std::size_t kFew = 128;
+constexpr std::size_t kNear = 64;
 
 }  // namespace
 
@@ -320,14 +321,16 @@ AffineSet::Climb AffineSet::Search(const Vector& direction, const Ends& ends, st
     for (const int row : rows) {
       const auto i = ToSize(row);
       const double value = Dot(phi(row), found.theta.data());
+      const double above = value - ends.upper[i], below = ends.lower[i] - value;
+      if (!(std::max(above, below) > worst)) continue;
       // A violation of rounding size is none: the climb would not end.
       const double allowed = kOfWidth * (ends.upper[i] - ends.lower[i]) + kOfValue * size_of_values_;
-      const double above = value - ends.upper[i] - allowed, below = ends.lower[i] - value - allowed;
-      if (!(std::max(above, below) > worst)) continue;
+      const double violation = std::max(above, below) - allowed;
+      if (!(violation > worst)) continue;
       if (std::find(found.basis.begin(), found.basis.begin() + std::ptrdiff_t(q), row) !=
           found.basis.begin() + std::ptrdiff_t(q))
         continue;
-      worst = std::max(above, below);
+      worst = violation;
       sign = above > below ? 1 : -1;
       entering = row;
     }
@@ -586,6 +589,18 @@ void AffineSet::Forget() {
     for (std::size_t j = 0; j < size_; ++j) vertex.basis[j] = place[ToSize(vertex.basis[j])];
 }
 
+// About kNear observations with the narrowest ends.
+std::span<const int> AffineSet::SeenBest(const Ends& ends, std::span<int> rows) const noexcept {
+  if (all_.size() <= 2 * kNear) return all_;
+  std::array<double, kMostKept> widths;
+  for (std::size_t i = 0; i < all_.size(); ++i) widths[i] = ends.upper[i] - ends.lower[i];
+  std::nth_element(widths.begin(), widths.begin() + kNear, widths.begin() + std::ssize(all_));
+  std::size_t count = 0;
+  for (const int row : all_)
+    if (ends.upper[ToSize(row)] - ends.lower[ToSize(row)] <= widths[kNear]) rows[count++] = row;
+  return rows.first(count);
+}
+
 Interval AffineSet::Enclose(std::span<const double> z) const noexcept {
   if (!is_bounded_ || ids_.size() > kMostKept) return Interval::Entire();
   Vector along{}, against{};
@@ -596,9 +611,18 @@ Interval AffineSet::Enclose(std::span<const double> z) const noexcept {
   for (std::size_t r = 0; r < rest_.size(); ++r) from[r] = z[ToSize(rest_variables_[r])];
   std::array<double, kMostKept> lower, upper;
   const Ends ends = EndsFrom(from, lower.data(), upper.data());
-  const std::span<const int> rows = HasRest() ? all_ : active_;
-  const Climb most = Search(along, ends, rows, Nearest(along), kMostStepsOfAQuery),
-              least = Search(against, ends, rows, HasRest() ? most.basis : Nearest(against), kMostStepsOfAQuery);
+  const auto search = [&](const Vector& direction, std::span<const int> rows, const Basis& start) {
+    return Search(direction, ends, rows, start, kMostStepsOfAQuery);
+  };
+  if (!HasRest()) {
+    const double most = SupportUpper(along, ends, search(along, active_, Nearest(along)));
+    return {-SupportUpper(against, ends, search(against, active_, Nearest(against))), most};
+  }
+  // Most steps look at few observations, those that are seen best.
+  std::array<int, kMostKept> near_rows;
+  const std::span<const int> near = SeenBest(ends, near_rows);
+  const Climb most = search(along, all_, search(along, near, Nearest(along)).basis),
+              least = search(against, all_, search(against, near, most.basis).basis);
   return {-SupportUpper(against, ends, least), SupportUpper(along, ends, most)};
 }
 

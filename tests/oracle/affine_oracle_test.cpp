@@ -140,13 +140,12 @@ TEST(AffineSetOracle, BoundsEveryParameterThatTheDataAdmitAndLittleMore) {
 
 // One or two columns, and a variable that is none. Numbers of few bits, so that ends are exact in doubles.
 struct DataWithRest {
-  std::vector<double> rest;
+  std::vector<double> rest, theta, knee, weight;
   Data data;
   std::vector<std::vector<double>> places;
 
   DataWithRest(Random& random, int columns, int count, double width, double off) {
     const auto any = [&](double most, double unit) { return unit * std::round(random.Uniform(-most, most) / unit); };
-    std::vector<double> theta, knee, weight;
     for (int l = 0; l <= columns; ++l) {
       theta.push_back(any(1, 0x1p-10));
       knee.push_back(any(1, 0x1p-10));
@@ -156,29 +155,35 @@ struct DataWithRest {
     for (int i = 0; i < count; ++i) {
       std::vector<double>& z = places.emplace_back();
       std::vector<double>& phi = data.phi.emplace_back();
-      double value = theta.back() + any(off, 0x1p-30);
-      for (int l = 0; l <= columns; ++l) {
-        z.push_back(random.Coin(0.2) ? random.Integer(-2, 2) : any(2, 0x1p-10));
-        const auto at = static_cast<std::size_t>(l);
-        value += weight[at] * rest[at] * std::abs(z.back() - knee[at]);
-        if (l < columns) value += theta[at] * z.back(), phi.push_back(z.back());
-      }
+      for (int l = 0; l <= columns; ++l) z.push_back(random.Coin(0.2) ? random.Integer(-2, 2) : any(2, 0x1p-10));
+      phi.assign(z.begin(), z.end() - 1);
       phi.push_back(1);
+      const double value = Truth(z) + any(off, 0x1p-30);
       data.lower.push_back(value - width + any(width / 2, 0x1p-30));
       data.upper.push_back(value + width + any(width / 2, 0x1p-30));
     }
   }
 
-  AffineSet Set() const {
+  double Truth(const std::vector<double>& z) const {
+    double value = theta.back();
+    for (std::size_t l = 0; l < z.size(); ++l) {
+      value += weight[l] * rest[l] * std::abs(z[l] - knee[l]);
+      if (l + 1 < z.size()) value += theta[l] * z[l];
+    }
+    return value;
+  }
+
+  // Of the first observations.
+  AffineSet Set(std::size_t count) const {
     const std::vector<double> least(rest.size(), -2), most(rest.size(), 2);
     std::vector<int> columns;
     for (int l = 0; l + 1 < std::ssize(rest); ++l) columns.push_back(l);
     AffineSet set(columns, least, most, rest);
-    for (std::size_t i = 0; i < places.size(); ++i)
-      set.Add(static_cast<int>(i), places[i], data.lower[i], data.upper[i]);
+    for (std::size_t i = 0; i < count; ++i) set.Add(static_cast<int>(i), places[i], data.lower[i], data.upper[i]);
     set.Derive();
     return set;
   }
+  AffineSet Set() const { return Set(places.size()); }
 
   double Apart(const std::vector<double>& a, const std::vector<double>& b) const {
     double sum = 0;
@@ -230,6 +235,35 @@ TEST(AffineSetOracle, WithARestBoundsTheRowWhereverItIsSeenFrom) {
       }
   }
   EXPECT_GT(bounded, 60);
+}
+
+// A query of many looks at few first; of too many, the latest and those that decide are kept.
+TEST(AffineSetOracle, WithARestManyObservationsBoundMore) {
+  TracedRandom random(865);
+  const DataWithRest with(random, 2, 2200, 0.0625, 0);
+  const AffineSet few = with.Set(100), many = with.Set(1000);
+  AffineSet learned = with.Set(1900);
+  for (std::size_t i = 1900; i < 2200; ++i)
+    learned.Learn(static_cast<int>(i), with.places[i], with.data.lower[i], with.data.upper[i]);
+  EXPECT_LE(learned.num_kept(), AffineSet::kMostKept);
+  double sum_of_few = 0, sum_of_many = 0;
+  for (int query = 0; query < 100; ++query) {
+    std::vector<double> z(3);
+    for (double& entry : z) entry = 0x1p-10 * random.Integer(-2048, 2048);
+    for (const AffineSet* set : std::initializer_list<const AffineSet*>{&few, &many, &learned}) {
+      ASSERT_TRUE(set->IsBounded() && !set->contradiction());
+      EXPECT_TRUE(set->Enclose(z).Contains(with.Truth(z)));
+    }
+    const Interval of_few = few.Enclose(z), of_many = many.Enclose(z);
+    EXPECT_LE(of_many.upper, of_few.upper + 1e-9);
+    EXPECT_GE(of_many.lower, of_few.lower - 1e-9);
+    sum_of_few += of_few.upper - of_few.lower;
+    sum_of_many += of_many.upper - of_many.lower;
+  }
+  EXPECT_LT(sum_of_many, 0.9 * sum_of_few);
+  learned.Learn(2200, with.places[0], with.data.upper[0] + 0.5, with.data.upper[0] + 0.75);
+  ASSERT_TRUE(learned.contradiction());
+  EXPECT_EQ(std::ranges::max(learned.contradiction()->rows), 2200);
 }
 
 // With one column: some M is left if, for each two observations, lower_i - upper_j - M (z_i - z_j) <= d(z_i, z_j).

@@ -97,7 +97,7 @@ TEST_F(LoadConfig, ReadsWhichRowsAreAffine) {
   EXPECT_EQ(with(Replaced(rest, "0.25, ax: 0.5", "0"), only_vy).grounds.declaration,
             with("{rows: [vx], columns: [vx]}", only_vy).grounds.declaration);
   EXPECT_THAT(error(Replaced(rest, "rest: {vx", "rest: {vy"), only_vy),
-              HasSubstr("declaration.affine.rest.vy is none of declaration.affine.rows"));
+              HasSubstr("declaration.affine.rest.vy: is none of declaration.affine.rows"));
   EXPECT_THAT(error(rest + "\n  state_error: {vy: 0.1}", only_vy),
               HasSubstr("declare a bound on that slope as declaration.lipschitz.vx.vy"));
 }
