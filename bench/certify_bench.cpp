@@ -196,19 +196,25 @@ void RegisterWorlds() {
     });
 }
 
-// The bicycle among the cells of a map and without them. Each cell would leave a certificate if it were 0.3 m larger.
-std::vector<Obstacle> MapCells(const Certifier& certifier, const Task& task, int count) {
+// The bicycle among the cells of a map and without them: anywhere, or along both sides of a street and else 3 m away.
+// Each cell would leave a certificate if it were 0.3 m larger.
+std::vector<Obstacle> MapCells(const Certifier& certifier, const Task& task, bool is_street, int count) {
   const Plan plan = task.plan();
   std::mt19937_64 random(1);
   const auto within = [&](double most) { return (static_cast<double>(random() >> 11) * 0x1p-53 * 2 - 1) * most; };
   std::vector<Obstacle> cells;
   Tube tube;
   static_cast<void>(certifier.Certify(plan, task.initial_set(), {}, tube));
-  while (std::ssize(cells) < count) {
-    const Eigen::Vector2d corner(std::floor(within(25) / 0.25) * 0.25, std::floor(within(25) / 0.25) * 0.25);
-    const Obstacle cell = Obstacle::AxisBox(corner, corner + Eigen::Vector2d(0.25, 0.25));
+  const auto add = [&](double x, double y, double room) {
+    const Obstacle cell = Obstacle::AxisBox(Eigen::Vector2d(x, y), Eigen::Vector2d(x + 0.25, y + 0.25));
     const Decision alone = certifier.JudgeSafety(plan, {&cell, 1}, tube);
-    if (alone.outcome == Outcome::kCertified && alone.margin - alone.threshold > 0.3) cells.push_back(cell);
+    if (alone.outcome == Outcome::kCertified && alone.margin - alone.threshold > room) cells.push_back(cell);
+  };
+  for (int i = 0; is_street && i < 200; ++i)
+    for (const double y : {3.0, -3.25}) add(-25 + 0.25 * i, y, 0.3);
+  while (std::ssize(cells) < count) {
+    const double x = std::floor(within(25) / 0.25) * 0.25, y = std::floor(within(25) / 0.25) * 0.25;
+    add(x, y, is_street ? 3 : 0.3);
   }
   return cells;
 }
@@ -216,7 +222,12 @@ std::vector<Obstacle> MapCells(const Certifier& certifier, const Task& task, int
 // A map's cells, and as many predictions of what moves, each for a tenth of a second. Made once, by the first trial.
 struct Surroundings {
   explicit Surroundings(const World& world)
-      : task(TaskIn(world)), certifier(task.problem), cells(MapCells(certifier, task, 2000)), cells_index(cells) {
+      : task(TaskIn(world)),
+        certifier(task.problem),
+        cells(MapCells(certifier, task, false, 2000)),
+        street(MapCells(certifier, task, true, 2000)),
+        cells_index(cells),
+        street_index(street) {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       ObstacleMotion motion;
       motion.stamp_us = motion.from_us = static_cast<std::int64_t>(i % 40) * 100'000;
@@ -230,8 +241,8 @@ struct Surroundings {
 
   Task task;
   Certifier certifier;
-  std::vector<Obstacle> cells, predicted;
-  ObstacleIndex cells_index, predicted_index;
+  std::vector<Obstacle> cells, street, predicted;
+  ObstacleIndex cells_index, street_index, predicted_index;
 };
 
 void RegisterMaps() {
@@ -246,6 +257,7 @@ void RegisterMaps() {
     };
     add("none", [](const Surroundings&) { return ObstacleView(); });
     add("map_2000", [](const Surroundings& all) { return ObstacleView(all.cells, all.cells_index); });
+    add("street_2000", [](const Surroundings& all) { return ObstacleView(all.street, all.street_index); });
     add("map_2000_without_index", [](const Surroundings& all) { return ObstacleView(all.cells); });
     add("predicted_2000", [](const Surroundings& all) { return ObstacleView(all.predicted, all.predicted_index); });
   }

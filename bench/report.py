@@ -126,6 +126,13 @@ class Report:
             at_most("dense declaration, N = 400, microseconds", self.cpu("certify/dense/400"), 100),
             at_least(f"batch on {threads} cores over one core", scaling, 0.9 * threads,
                      "an idle machine: two processes at once are 2 % slower each"),
+        ] + [
+            at_most(f"call with 2,000 cells {place} over one with none, {body.replace('_', ' ')}",
+                    ratio(self.cpu(f"map/{body}/{cells}_2000"), self.cpu(f"map/{body}/none")), 1.5,
+                    "one search for the nearest and the near")
+            for place, cells in (("along a street", "street"), ("anywhere", "map"))
+            for body in ("point", "rectangle", "rectangle_swept")
+        ] + [
             at_most("bicycle by Runge-Kutta as text: time over the compiled Euler step", self.beside_compiled("bicycle_rk4"), 6.8,
                     "fewer terms in the chain rule of its stages, 23 % of the instructions"),
             at_most("quadrotor by Runge-Kutta, 20 steps: time over 12 of the compiled bicycle",

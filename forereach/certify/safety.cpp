@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <span>
@@ -14,6 +15,8 @@
 #include "forereach/dynamics/angles.h"
 #include "forereach/dynamics/evaluate.h"
 #include "forereach/dynamics/text_program.h"
+#include "forereach/numerics/instruction_set.h"
+#include "forereach/numerics/lanes.h"
 #include "forereach/numerics/size.h"
 #include "forereach/safety/obstacle_index.h"
 #include "forereach/safety/occupancy_grid.h"
@@ -264,10 +267,13 @@ class SafetyTest::Unit {
   // Above the clearance `enough` it need not be the best.
   [[nodiscard]] PartSeparation Best(const PartSeparation& by_hulls, const Obstacle& obstacle, const Encounter& meeting,
                                     double enough = kInfinity) noexcept {
+    return Better(BestOfParts(obstacle, meeting, enough), by_hulls, placement().parts().size());
+  }
+  [[nodiscard]] PartSeparation BestOfParts(const Obstacle& obstacle, const Encounter& meeting, double enough) noexcept {
     const auto separate = [&](std::size_t i, double added) {
       return SeparatePart(i, obstacle, added, meeting, enough);
     };
-    return Better(ClosestPart(meeting, separate), by_hulls, placement().parts().size());
+    return ClosestPart(meeting, separate);
   }
 
   // How the obstacle meets the unit; the reference is valid until the next call.
@@ -502,8 +508,10 @@ class SafetyTest::Judgement {
 
   // What has no end in each unit; the others where the index finds them near.
   void SeeNear(const ObstacleIndex& index) noexcept {
-    EncloseHulls();
     if (has_boxes()) EncloseBodies();
+    if (!has_boxes() || index.has_moving() || !index.everywhere().empty()) EncloseHulls();
+    BuildTree(first_, units_);
+    if (has_boxes()) SeeNearest(index);
     SeeNear(index, first_, units_);
     if (index.has_moving()) SeeMoving(index);
     if (!index.everywhere().empty()) SeeEverywhere(index);
@@ -600,11 +608,22 @@ class SafetyTest::Judgement {
     Hull after{};
     for (int t = units_ - 1 + span(); t >= first_; --t) {
       const std::size_t i = ToSize(t - first_);
-      poses_[i] = placement.PoseOver(tube_.slice(t), tube_.half_width(t));
+      placement.PoseOver(tube_.slice(t), tube_.half_width(t), poses_[i]);
       const Hull body = placement.EncloseBody(poses_[i]);
-      if (t < units_) bodies_[i] = span() == 0 ? body : Join(body, after, placement.dim());
+      if (t < units_) bodies_[i] = span() == 0 ? body : AroundBoth(body, after);
       after = body;
     }
+  }
+  // In plain arithmetic: BoxTree and WithTolerance allow for its rounding. Infinite hulls have no center.
+  [[nodiscard]] static Hull AroundBoth(const Hull& a, const Hull& b) noexcept {
+    Hull both;
+    for (std::size_t k = 0; k < kMaxSafetyDim; ++k) {
+      const double lower = std::min(a.center[k] - a.half_width[k], b.center[k] - b.half_width[k]),
+                   upper = std::max(a.center[k] + a.half_width[k], b.center[k] + b.half_width[k]);
+      both.center[k] = 0.5 * (lower + upper);
+      both.half_width[k] = 0.5 * (upper - lower);
+    }
+    return both;
   }
 
   // Without initializers: a list of many costs nothing until they are found.
@@ -612,34 +631,37 @@ class SafetyTest::Judgement {
     int t, o;
     double gap;                     // a lower bound on the distance, about; no NaN
     std::array<double, 2> towards;  // a direction that shows it; zero: none
-    bool is_refined;
+    bool is_refined;                // by that direction
   };
+
+  // What is nearest by the bounds of a search leaves few of the others.
+  void SeeNearest(const ObstacleIndex& index) noexcept {
+    const Near nearest = Dispatch<&Judgement::FindNearest>(test_.instructions_, *this, index);
+    if (nearest.o < 0) return;
+    if (nearest.gap > WithTolerance(index, 0) && ConsiderNear(index, nearest))
+      considered_ = {nearest.t, nearest.o};
+    else
+      farthest_ = DistanceUpper(nearest.t, obstacle(nearest.o));
+  }
+  // The pair of the least lower bound; that of no obstacle is infinite.
+  [[nodiscard]] static Near FindNearest(Judgement& judgement, const ObstacleIndex& index) noexcept {
+    Near nearest{-1, -1, kInfinity, {}, true};
+    judgement.ForEachNear(
+        index, judgement.first_, [&] { return std::min(nearest.gap, judgement.closest_.clearance); },
+        [&](int t, int o) {
+          if (const Near pair = judgement.Approach(t, o, nearest.gap); pair.gap < nearest.gap) nearest = pair;
+        });
+    return nearest;
+  }
 
   // All pairs that may touch or be the closest, those that may touch in the order of time. If there are too many, fewer
   // units at once.
   void SeeNear(const ObstacleIndex& index, int from, int to) noexcept {
-    std::array<Near, 384> near;
-    std::size_t count = 0;
-    bool has_room = true;
-    ForEachNear(
-        index, from, to, [&] { return farthest(); },
-        [&](int t, int o) {
-          if (!has_room) return;
-          const Obstacle& other = obstacle(o);
-          Near pair{t, o, Gap(t, other), {}, false};
-          if (pair.gap > WithTolerance(index, farthest())) return;
-          if (pair.gap < std::max(nearest_gap_, farthest_ / 16)) {
-            nearest_gap_ = std::min(nearest_gap_, pair.gap);
-            farthest_ = std::min(farthest_, DistanceUpper(t, other));
-          }
-          if (count < near.size())
-            near[count++] = pair;
-          else if (to - from > 1)
-            has_room = false;
-          else
-            Refine(pair, WithTolerance(index, farthest())), SettleNear(index, pair), ConsiderNear(index, pair);
-        });
-    if (!has_room) {
+    std::array<Near, 256> near;
+    if (to - from < units_ - first_) BuildTree(from, to);
+    const std::size_t count =
+        Dispatch<&Judgement::Gather>(test_.instructions_, *this, index, from, to, std::span<Near>(near));
+    if (count > near.size()) {
       const int middle = (from + to) / 2;
       SeeNear(index, from, middle);
       return touched_ == units_ ? SeeNear(index, middle, to) : void();
@@ -651,26 +673,55 @@ class SafetyTest::Judgement {
               [](const Near& a, const Near& b) { return std::tie(a.t, a.o) < std::tie(b.t, b.o); });
     for (auto pair = found.begin(); pair != others; ++pair) {
       if (IsAfterTouch(pair->t, pair->o)) return;
-      Refine(*pair, WithTolerance(index, farthest()));
       SettleNear(index, *pair);
     }
     if (touched_ < units_) return;
     // The nearest first: they leave few of the others, most of them not even refined.
-    const auto is_further = [](const Near& a, const Near& b) { return a.gap > b.gap; };
-    std::ranges::make_heap(found, is_further);
-    for (auto end = found.end(); end != found.begin();) {
-      const double far = WithTolerance(index, farthest());
-      if (found.front().gap > far) return;
-      std::pop_heap(found.begin(), end, is_further);
-      Near& nearest = *std::prev(end);
-      if (nearest.is_refined) {
-        ConsiderNear(index, nearest);
-        --end;
-      } else {
-        Refine(nearest, far);
-        std::push_heap(found.begin(), end, is_further);
+    for (auto rest = found; !rest.empty();) {
+      Near& nearest = *std::ranges::min_element(rest, {}, &Near::gap);
+      if (nearest.gap > WithTolerance(index, farthest())) return;
+      if (!std::exchange(nearest.is_refined, true)) {
+        unit_.Enter(nearest.t);
+        const auto& [x, y] = nearest.towards;
+        nearest.gap = std::max(nearest.gap, unit_.ClearanceAlong({x, y, 0}, obstacle(nearest.o)));
+        continue;
       }
+      ConsiderOrSearch(index, nearest);
+      std::swap(nearest, rest.front());
+      rest = rest.subspan(1);
     }
+  }
+  // How many there are; more than there is room for: not all. Of a single unit those without room are dealt with.
+  [[nodiscard]] static std::size_t Gather(Judgement& judgement, const ObstacleIndex& index, int from, int to,
+                                          std::span<Near> near) noexcept {
+    std::size_t count = 0;
+    judgement.ForEachNear(
+        index, from, [&] { return count > near.size() ? -kInfinity : judgement.farthest(); },
+        [&](int t, int o) {
+          const double far = judgement.WithTolerance(index, judgement.farthest());
+          if (count > near.size() || judgement.considered_ == std::pair(t, o)) return;
+          const Near pair = judgement.Approach(t, o, far);
+          if (pair.gap > far) return;
+          if (pair.gap < std::max(judgement.nearest_gap_, judgement.farthest_ / 16)) {
+            judgement.nearest_gap_ = std::min(judgement.nearest_gap_, pair.gap);
+            judgement.farthest_ = std::min(judgement.farthest_, judgement.DistanceUpper(t, judgement.obstacle(o)));
+          }
+          if (count < near.size())
+            near[count++] = pair;
+          else if (to - from > 1)
+            ++count;
+          else
+            judgement.Judge(index, pair);
+        });
+    return count;
+  }
+  [[gnu::noinline]] void Judge(const ObstacleIndex& index, const Near& pair) noexcept {
+    SettleNear(index, pair);
+    ConsiderOrSearch(index, pair);
+  }
+  void BuildTree(int from, int to) noexcept {
+    tree_.Build(std::span(has_boxes() ? bodies_ : hulls_).subspan(ToSize(from - first_), ToSize(to - from)),
+                test_.placement_.dim());
   }
 
   // What is further is not the closest. Where places of the body are not known before they are enclosed, not yet.
@@ -678,9 +729,9 @@ class SafetyTest::Judgement {
     return test_.placement_.has_expressions() ? 0 : std::min(closest_.clearance, farthest_);
   }
   // How many samples a unit has besides its first one.
-  [[nodiscard]] int span() const { return test_.placement_.sweeps() ? 1 : 0; }
+  [[nodiscard]] int span() const { return span_; }
   // Whether boxes around the body are searched; otherwise hulls of its places, with its reach.
-  [[nodiscard]] bool has_boxes() const { return !is_at_frame() && !test_.placement_.has_expressions(); }
+  [[nodiscard]] bool has_boxes() const { return has_boxes_; }
 
   // More than a search for the best direction may lose of a distance.
   [[nodiscard]] double WithTolerance(const ObstacleIndex& index, double distance) const noexcept {
@@ -690,17 +741,16 @@ class SafetyTest::Judgement {
            kSearchTolerance * (index.size() + test_.placement_.reach()) + kRounding * tree_.size();
   }
 
-  // Calls visit(t, o). Unless all of the body is at the frame, what is left out is further by more than a search may
-  // lose.
+  // Calls visit(t, o) for units of the tree, which begins with unit `from`. Unless all of the body is at the frame,
+  // what is left out is further by more than a search may lose.
   template <class Within, class Visit>
-  void ForEachNear(const ObstacleIndex& index, int from, int to, const Within& within, const Visit& visit) noexcept {
-    tree_.Build(std::span(has_boxes() ? bodies_ : hulls_).subspan(ToSize(from - first_), ToSize(to - from)),
-                test_.placement_.dim());
+  void ForEachNear(const ObstacleIndex& index, int from, const Within& within, const Visit& visit) noexcept {
     const double reach = has_boxes() ? 0 : test_.placement_.reach();
-    const auto see = [&](int i, int o) { visit(from + i, o); };
-    if (is_at_frame()) return index.ForEachNear(tree_, reach, within, see);
     index.ForEachNear(
-        tree_, reach, [&] { return WithTolerance(index, within()); }, see);
+        tree_, reach, [&] { return is_at_frame() ? within() : WithTolerance(index, within()); },
+        [&](int i, int o) { visit(from + i, o); },
+        [&](int i, const Lanes& lower, const Lanes& upper)
+            __attribute__((always_inline)) { return GapAcrossSides(from + i, lower, upper); });
   }
 
   // Between the box around the body, or around its places widened by its reach, and that around the obstacle.
@@ -730,6 +780,9 @@ class SafetyTest::Judgement {
       return std::sqrt(square);
     };
     const Placement::Pose& pose = poses_[ToSize(t - first_)];
+    const auto point = [&](int i) {
+      return std::array{pose.middle[0][ToSize(i)], pose.middle[1][ToSize(i)], pose.middle[2][ToSize(i)]};
+    };
     const Eigen::Vector3d center = (other.lower() + other.upper()) / 2;
     double least = kInfinity;
     if (!has_boxes()) {
@@ -737,11 +790,11 @@ class SafetyTest::Judgement {
     } else {
       for (const Placement::Part& part : placement.parts()) {
         const int last = part.first + part.count - 1;
-        auto from = placement.Middle(pose, last);
+        auto from = point(last);
         for (int i = part.first; i <= last; ++i) {  // the point of a side next to the obstacle's middle
-          const auto to = placement.Middle(pose, i);
+          const auto to = point(i);
           double along = 0, square = 0;
-          for (std::size_t k = 0; k < to.size(); ++k) {
+          for (std::size_t k = 0; k < ToSize(placement.dim()); ++k) {
             along += (center[static_cast<Eigen::Index>(k)] - from[k]) * (to[k] - from[k]);
             square += (to[k] - from[k]) * (to[k] - from[k]);
           }
@@ -758,8 +811,8 @@ class SafetyTest::Judgement {
 
   // As Settle, of a pair that may touch. What is proven here may be the closest.
   void SettleNear(const ObstacleIndex& index, const Near& pair) noexcept {
-    const auto& [t, o, gap, towards, is_refined] = pair;
-    if (gap > WithTolerance(index, 0) || IsAfterTouch(t, o)) return;
+    const int t = pair.t, o = pair.o;
+    if (pair.gap > WithTolerance(index, 0) || IsAfterTouch(t, o)) return;
     const Separation by_hulls = ByHulls(t, o);
     if (by_hulls.IsProven()) return;
     unit_.Enter(t);
@@ -769,7 +822,12 @@ class SafetyTest::Judgement {
 
   // Of what stands, with an index.
   [[nodiscard]] Separation ByHulls(int t, int o) const noexcept {
-    return SeparateHulls(hulls_[ToSize(t - first_)], obstacle(o), test_.placement_.reach());
+    const std::size_t i = ToSize(t - first_);
+    const auto hull = [&] {
+      const Hull &first = poses_[i].frame, &last = poses_[i + ToSize(span())].frame;
+      return span() == 0 ? first : Join(first, last, test_.placement_.dim());
+    };
+    return SeparateHulls(has_boxes() ? hull() : hulls_[i], obstacle(o), test_.placement_.reach());
   }
 
   // @pre unit t is entered, with its hulls.
@@ -827,101 +885,147 @@ class SafetyTest::Judgement {
   }
   void Consider(const Pair& pair) noexcept {
     unit_.Enter(pair.step);
-    const double enough =
-        closest_.clearance + 1e-9 * (1 + std::abs(closest_.clearance));  // so that none as close is lost
     PartSeparation best =
-        unit_.Best(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle)), enough);
+        unit_.Best(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle)), Enough());
     if (!best.separation.IsProven() && pair.boxed.IsProven()) best = {pair.boxed, -1};
     closest_.Consider(best, pair.step, pair.obstacle);
+  }
+  // A clearance above which a pair is not the closest: none as close is lost.
+  [[nodiscard]] double Enough() const noexcept {
+    return closest_.clearance + 1e-9 * (1 + std::abs(closest_.clearance));
   }
   // What no cheap bound proves has been considered before.
   void ConsiderIfCloser(Pair& pair) noexcept {
     if (IsCloser(pair) && !pair.is_direct) Direct(pair);
     if (IsCloser(pair) && pair.IsProven()) Consider(pair);
   }
-  // Of what stands, with an index: in the order of their cost.
-  void ConsiderNear(const ObstacleIndex& index, const Near& pair) noexcept {
-    const auto& [t, o, gap, towards, is_refined] = pair;
+  // Of what stands, with an index: in the order of their cost. False if nothing proves the pair apart.
+  [[nodiscard]] bool ConsiderNear(const ObstacleIndex& index, const Near& pair) noexcept {
+    const int t = pair.t, o = pair.o;
     const double far = WithTolerance(index, std::min(closest_.clearance, farthest_));
-    if (gap > far) return;
+    if (pair.gap > far) return true;
     const Separation by_hulls = ByHulls(t, o);
     unit_.Enter(t);
     if (is_at_frame()) {
-      if (by_hulls.IsProven() && closest_.Yields(by_hulls.clearance(), t, o) &&
+      if (!by_hulls.IsProven()) return false;
+      if (closest_.Yields(by_hulls.clearance(), t, o) &&
           !(unit_.ByDirections(obstacle(o), {}).separation.clearance() > far))
         Consider({{by_hulls, -1}, {}, by_hulls.clearance(), t, o, true});
-      return;
+      return true;
     }
-    if (unit_.ClearanceAlong({towards[0], towards[1], 0}, obstacle(o)) > far) return;
-    const PartSeparation direct = unit_.ByDirections({by_hulls, -1}, obstacle(o), {});
-    if (direct.separation.clearance() > far) return;
-    const Separation boxed = direct.separation.IsProven() ? Separation{} : ByBox(t, o);
-    const double clearance = std::max(direct.separation.clearance(), boxed.clearance());
-    if (clearance > far) return;
-    if (direct.separation.IsProven() || boxed.IsProven()) return Consider({direct, boxed, clearance, t, o, true});
-    if (gap > WithTolerance(index, 0)) Search(direct, t, o);  // otherwise SettleNear has searched
+    const auto direct = [&] { return unit_.ByDirections({by_hulls, -1}, obstacle(pair.o), {}); };
+    if (test_.placement_.has_expressions() && direct().separation.clearance() > far) return true;
+    const PartSeparation searched = unit_.BestOfParts(obstacle(o), {}, Enough());
+    if (searched.separation.IsProven() && searched.separation.clearance() > Enough()) return true;
+    PartSeparation best = Better(searched, direct(), test_.placement_.parts().size());
+    if (!best.separation.IsProven()) best = {ByBox(t, o), -1};
+    if (best.separation.IsProven()) closest_.Consider(best, t, o);
+    return best.separation.IsProven();
+  }
+  // Of one that may touch SettleNear has said so.
+  void ConsiderOrSearch(const ObstacleIndex& index, const Near& pair) noexcept {
+    if (ConsiderNear(index, pair) || !(pair.gap > WithTolerance(index, 0)) || is_at_frame()) return;
+    Search(unit_.ByDirections({ByHulls(pair.t, pair.o), -1}, obstacle(pair.o), {}), pair.t, pair.o);
   }
 
-  // The points of a body's parts in the plane, in the middles of a unit's slices, with what is around them; and the
-  // half-planes along the sides of each part, with all of the part over the unit: {y : (x, y) . y <= end}.
+  // The half-planes along the sides of a body in the plane over a unit: all of the part to which a side belongs is in
+  // {y : (x, y) . y <= end}, up to rounding. A part has its sides at all samples of the unit, one after the other.
   struct Outline {
-    static constexpr std::size_t kMost = std::size_t{2} * kMaxBodyPoints;
     int t = -1;
-    std::array<double, kMost> x, y, around, side_x, side_y, side_end;
-    std::array<std::array<double, 2>, 2> width;  // of the frame, at each sample
+    std::array<double, std::size_t{2} * kMaxBodyPoints + kLaneCount> x, y, end;
   };
+  // The sides of a part of more than one point.
+  [[nodiscard]] std::size_t FirstSide(int point) const noexcept { return ToSize(point * (1 + span())); }
+
+  // Whether anything is known of the body over a unit.
+  [[nodiscard]] bool IsKnown(int t) const noexcept {
+    return poses_[ToSize(t - first_)].is_known && poses_[ToSize(t - first_ + span())].is_known;
+  }
 
   const Outline& SketchBody(int t) noexcept {
     Outline& outline = outlines_[ToSize(t) % outlines_.size()];
     if (std::exchange(outline.t, t) == t) return outline;
-    const Placement& placement = test_.placement_;
-    for (std::size_t s = 0; s <= ToSize(span()); ++s) {
-      const Placement::Pose& pose = poses_[ToSize(t - first_) + s];
-      outline.width[s] = {pose.frame.half_width[0], pose.frame.half_width[1]};
-      for (const Placement::Part& part : placement.parts())
-        for (int i = part.first; i < part.first + part.count; ++i) {
-          const std::size_t j = s * kMaxBodyPoints + ToSize(i);
-          const auto middle = placement.Middle(pose, i);
-          outline.x[j] = middle[0];
-          outline.y[j] = middle[1];
-          outline.around[j] = placement.Around(pose, i) + part.radius;
+    for (const Placement::Part& part : test_.placement_.parts()) {
+      const std::size_t first = FirstSide(part.first), end = FirstSide(part.first + part.count);
+      std::size_t j = first;
+      for (int s = 0; s <= span(); ++s)
+        for (int i = part.first; i < part.first + part.count; ++i, ++j) {
+          const auto side = test_.placement_.Side(poses_[ToSize(t - first_ + s)], i);
+          outline.x[j] = side[0];
+          outline.y[j] = side[1];
         }
+      StoreLanes(AllLanes(0), &outline.x[end]);  // up to the next part
+      StoreLanes(AllLanes(0), &outline.y[end]);
+      for (j = first; j < end; j += kLaneCount)
+        StoreLanes(FarthestOf(t, part, LoadLanes(&outline.x[j]), LoadLanes(&outline.y[j])), &outline.end[j]);
     }
-    for (std::size_t s = 0; s <= ToSize(span()); ++s)
-      for (const Placement::Part& part : placement.parts()) {
-        const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
-        for (std::size_t j = first; j < end && part.count > 1; ++j) {
-          const std::size_t next = j + 1 < end ? j + 1 : first;
-          const double across_x = outline.y[next] - outline.y[j], across_y = outline.x[j] - outline.x[next];
-          const double length = std::sqrt(across_x * across_x + across_y * across_y);
-          const double scale = length > 0x1p-300 ? 1 / length : 0;
-          outline.side_x[j] = scale * across_x;
-          outline.side_y[j] = scale * across_y;
-          outline.side_end[j] = FarthestOf(outline, part, outline.side_x[j], outline.side_y[j]);
-        }
-      }
     return outline;
   }
-  // Of all of a part along a vector of length 1, or 0.
-  [[nodiscard]] double FarthestOf(const Outline& outline, const Placement::Part& part, double x,
-                                  double y) const noexcept {
-    double farthest = -kInfinity;
-    for (std::size_t s = 0; s <= ToSize(span()); ++s) {
-      const double width = std::abs(x) * outline.width[s][0] + std::abs(y) * outline.width[s][1];
-      const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
-      for (std::size_t j = first; j < end; ++j)
-        farthest = Larger(farthest, x * outline.x[j] + y * outline.y[j] + outline.around[j] + width);
+  // Of all of a part over a unit, along vectors of length 1, or 0. @pre IsKnown.
+  [[nodiscard]] FOREREACH_INLINE Lanes FarthestOf(int t, const Placement::Part& part, const Lanes& x,
+                                                  const Lanes& y) const noexcept {
+    Lanes farthest = AllLanes(-kInfinity);
+    for (int s = 0; s <= span(); ++s) {
+      const Placement::Pose& pose = poses_[ToSize(t - first_ + s)];
+      Lanes at_sample = AllLanes(-kInfinity);
+      for (std::size_t i = ToSize(part.first); i < ToSize(part.first + part.count); ++i)
+        at_sample = Max(x * AllLanes(pose.middle[0][i]) + y * AllLanes(pose.middle[1][i]) + AllLanes(pose.around[i]),
+                        at_sample);
+      const auto& width = pose.frame.half_width;
+      farthest = Max(at_sample + Abs(x) * AllLanes(width[0]) + Abs(y) * AllLanes(width[1]), farthest);
     }
-    return farthest;
+    return farthest + AllLanes(part.radius);
   }
 
-  // Raises the pair's gap to a lower bound on the distance from the body, up to rounding: by its outline, in the plane.
-  // What is above `far` need not be raised further.
-  void Refine(Near& pair, double far) noexcept {
-    pair.is_refined = true;
-    if (!has_boxes() || test_.placement_.dim() != 2) return;
-    const Outline& outline = SketchBody(pair.t);
-    const Obstacle& other = obstacle(pair.o);
+  // A lower bound, about, on the distance of the body from a box with these ends, by its sides; negative: none.
+  [[nodiscard]] FOREREACH_INLINE double GapAcrossSides(int t, const Lanes& lower, const Lanes& upper) noexcept {
+    if (!has_sides_ || !IsKnown(t)) return -1;
+    const Outline& outline = SketchBody(t);
+    const Lanes center = AllLanes(0.5) * (lower + upper), half_width = AllLanes(0.5) * (upper - lower);
+    const Lanes center_x = AllLanes(center[0]), center_y = AllLanes(center[1]), half_x = AllLanes(half_width[0]),
+                half_y = AllLanes(half_width[1]);
+    double least = kInfinity;
+    for (const Placement::Part& part : test_.placement_.parts()) {
+      Lanes best = AllLanes(-1);
+      for (std::size_t j = FirstSide(part.first), end = FirstSide(part.first + part.count); j < end; j += kLaneCount) {
+        const Lanes x = LoadLanes(&outline.x[j]), y = LoadLanes(&outline.y[j]);
+        const Lanes gap = x * center_x + y * center_y - Abs(x) * half_x - Abs(y) * half_y - LoadLanes(&outline.end[j]);
+        best = Max(FirstLanes(gap, end - j, -1), best);
+      }
+      least = std::min(least, std::max(std::max(best[0], best[1]), std::max(best[2], best[3])));
+    }
+    return least;
+  }
+
+  // A bound by one direction.
+  struct Along {
+    double gap = -kInfinity;
+    std::array<double, 2> towards{};
+  };
+  // The largest lowest(x, y) - end of the sides of a part.
+  template <class Lowest>
+  [[nodiscard]] FOREREACH_INLINE Along AcrossSides(const Outline& outline, const Placement::Part& part,
+                                                   const Lowest& lowest) const noexcept {
+    Along best;
+    const std::size_t end = FirstSide(part.first + part.count);
+    for (std::size_t j = FirstSide(part.first); j < end; j += kLaneCount) {
+      const Lanes gaps = FirstLanes(
+          lowest(LoadLanes(&outline.x[j]), LoadLanes(&outline.y[j])) - LoadLanes(&outline.end[j]), end - j, -kInfinity);
+      const double most = std::max(std::max(gaps[0], gaps[1]), std::max(gaps[2], gaps[3]));
+      if (!(most > best.gap && most < kInfinity)) continue;
+      const std::size_t i = ToSize(std::countr_zero(BitsOf(gaps == AllLanes(most))));
+      best = {most, {outline.x[j + i], outline.y[j + i]}};
+    }
+    return best;
+  }
+
+  // A pair, with a lower bound on its distance, up to rounding: by the boxes around both; in the plane by the body's
+  // outline, unless it is above `far`.
+  [[nodiscard]] Near Approach(int t, int o, double far) noexcept {
+    const Obstacle& other = obstacle(o);
+    Near pair{t, o, Gap(t, other), {}, true};
+    if (pair.gap > far || !has_boxes() || test_.placement_.dim() != 2 || !IsKnown(t)) return pair;
+    const Outline& outline = SketchBody(t);
     Along least;
     least.gap = kInfinity;
     for (const Placement::Part& part : test_.placement_.parts())
@@ -929,51 +1033,43 @@ class SafetyTest::Judgement {
         least = along;
     pair.gap = std::max(pair.gap, least.gap - other.radius());
     pair.towards = least.towards;
+    pair.is_refined = false;
+    return pair;
   }
-  // A bound by one direction.
-  struct Along {
-    double gap = -kInfinity;
-    std::array<double, 2> towards{};
-  };
   // Across the sides of the body, and from the nearest point to the box around the core.
   [[nodiscard]] Along GapAround(const Outline& outline, const Obstacle& other, const Placement::Part& part,
                                 double far) const noexcept {
-    const Eigen::Vector3d &lower = other.lower(), &upper = other.upper();
-    const auto &x = outline.x, &y = outline.y;
+    const auto lowest = [&](const Lanes& x, const Lanes& y) __attribute__((always_inline)) {
+      Lanes least = AllLanes(kInfinity);
+      for (const Eigen::Vector3d& point : other.hull())
+        least = Min(x * AllLanes(point[0]) + y * AllLanes(point[1]), least);
+      return least;
+    };
     Along best;
+    if (part.count > 1) best = AcrossSides(outline, part, lowest);
+    if (best.gap > far) return best;
+    const Eigen::Vector3d &lower = other.lower(), &upper = other.upper();
     double nearest = kInfinity, towards_x = 0, towards_y = 0;
-    for (std::size_t s = 0; s <= ToSize(span()); ++s) {
-      const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
-      for (std::size_t j = first; j < end && part.count > 1; ++j)
-        if (const double gap = LowestOf(other, outline.side_x[j], outline.side_y[j]) - outline.side_end[j];
-            gap > best.gap && gap < kInfinity)
-          best = {gap, {outline.side_x[j], outline.side_y[j]}};
-      for (std::size_t j = first; j < end; ++j) {
-        const double to_x = std::max(lower[0] - x[j], 0.0) + std::min(upper[0] - x[j], 0.0),
-                     to_y = std::max(lower[1] - y[j], 0.0) + std::min(upper[1] - y[j], 0.0);
+    for (int s = 0; s <= span(); ++s) {
+      const Placement::Pose& pose = poses_[ToSize(outline.t - first_ + s)];
+      for (std::size_t i = ToSize(part.first); i < ToSize(part.first + part.count); ++i) {
+        const double x = pose.middle[0][i], y = pose.middle[1][i];
+        const double to_x = std::max(lower[0] - x, 0.0) + std::min(upper[0] - x, 0.0),
+                     to_y = std::max(lower[1] - y, 0.0) + std::min(upper[1] - y, 0.0);
         if (const double square = to_x * to_x + to_y * to_y; square < nearest) {
           nearest = square;
           towards_x = to_x;
           towards_y = to_y;
         }
       }
-      if (best.gap > far) return best;
     }
     if (!(nearest > 0x1p-600)) return best;
-    const double scale = 1 / std::sqrt(nearest), to_x = scale * towards_x, to_y = scale * towards_y;
-    if (const double gap = LowestOf(other, to_x, to_y) - FarthestOf(outline, part, to_x, to_y);
+    const double scale = 1 / std::sqrt(nearest);
+    const Lanes to_x = AllLanes(scale * towards_x), to_y = AllLanes(scale * towards_y);
+    if (const double gap = (lowest(to_x, to_y) - FarthestOf(outline.t, part, to_x, to_y))[0];
         gap > best.gap && gap < kInfinity)
-      best = {gap, {to_x, to_y}};
+      best = {gap, {to_x[0], to_y[0]}};
     return best;
-  }
-  // Of the core along a vector.
-  [[nodiscard]] static double LowestOf(const Obstacle& other, double x, double y) noexcept {
-    if (other.kind() == Obstacle::Kind::kBox)
-      return std::min(x * other.lower()[0], x * other.upper()[0]) +
-             std::min(y * other.lower()[1], y * other.upper()[1]);
-    double core = kInfinity;
-    for (const Eigen::Vector3d& point : other.hull()) core = std::min(core, x * point[0] + y * point[1]);
-    return core;
   }
 
   void ConsiderIfCloser(const Separation& by_hulls, int t, int o) noexcept {
@@ -1014,13 +1110,14 @@ class SafetyTest::Judgement {
       for (Pair& pair : nearest_.InOrder(closest_.clearance, least)) ConsiderIfCloser(pair);
     else if (index == nullptr || index->has_moving() || !index->everywhere().empty())
       LookAgain();
-    if (index != nullptr && test_.placement_.has_expressions())
+    if (index != nullptr && test_.placement_.has_expressions()) {
+      BuildTree(first_, units_);
       ForEachNear(
-          *index, first_, units_, [&] { return closest_.clearance; },
+          *index, first_, [&] { return closest_.clearance; },
           [&](int t, int o) {
-            const Near pair{t, o, 0, {}, true};
-            ConsiderNear(*index, pair);
+            static_cast<void>(ConsiderNear(*index, {t, o, 0, {}, true}));
           });
+    }
   }
 
   // At those for which there was no room.
@@ -1052,7 +1149,8 @@ class SafetyTest::Judgement {
 
   const SafetyTest& test_;
   const ObstacleView& obstacles_;
-  const int first_, units_;
+  const int first_, units_, span_ = test_.placement_.sweeps() ? 1 : 0;
+  const bool has_boxes_ = !is_at_frame() && !test_.placement_.has_expressions();
   const Tube& tube_;
   const Schedule& schedule_;
   const ConvexNumbers numbers_;
@@ -1070,10 +1168,15 @@ class SafetyTest::Judgement {
   // Without, of each core in each unit.
   std::array<double, 4096> bounds_;
   StandingCores cores_;
-  std::array<Outline, 16> outlines_;  // of the units that were last looked at, by their remainders
-  double farthest_ = kInfinity;       // of the closest pair, from above
-  double nearest_gap_ = kInfinity;    // the least of those that farthest_ was found from
-  HullTree tree_;
+  // Whether all parts of a body in the plane have sides.
+  const bool has_sides_ =
+      has_boxes() && test_.placement_.dim() == 2 &&
+      std::ranges::all_of(test_.placement_.parts(), [](const auto& part) { return part.count > 1; });
+  std::array<Outline, 16> outlines_;        // of the units that were last looked at, by their remainders
+  double farthest_ = kInfinity;             // of the closest pair, from above
+  double nearest_gap_ = kInfinity;          // the least of those that farthest_ was found from
+  std::pair<int, int> considered_{-1, -1};  // a unit and an obstacle
+  HullTree tree_;                           // of units
 };
 
 Decision SafetyTest::Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube, int first,

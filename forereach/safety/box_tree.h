@@ -63,8 +63,8 @@ class Halves final {
   }
 
   /** Calls visit(t, i) for hulls t and things i, each pair at most once and about from near to far. Left out are those
-  whose nodes have a `square_of(hulls, node)` of their distance that is negative, never, or above that of `far()`, which
-  may fall on the way. It allocates nothing. */
+  whose nodes have a `square_of(hulls, node, most)` of their distance that is negative, never, or above `most`, that of
+  `far()`, which may fall on the way. It allocates nothing. */
   template <class Square, class Far, class Visit>
   void Search(const HullTree& hulls, const Square& square_of, const Far& far, const Visit& visit) const {
     if (nodes_.empty()) return;
@@ -72,12 +72,12 @@ class Halves final {
       std::int32_t hulls, things;
       double square;
     };
-    const auto entry = [&](std::int32_t t, std::int32_t i) {
-      return Entry{t, i, square_of(hulls.node(t), nodes_[ToSize(i)])};
-    };
     std::array<Entry, kMostLevels> stack;
     std::size_t count = 0;
     double most = far(), most_square = most * most;  // only a visit lowers them
+    const auto entry = [&](std::int32_t t, std::int32_t i) {
+      return Entry{t, i, square_of(hulls.node(t), nodes_[ToSize(i)], most_square)};
+    };
     const auto is_near = [&](const Entry& some) { return !(some.square < 0 || some.square > most_square); };
     Entry at = entry(0, 0);
     while (true) {
@@ -147,16 +147,11 @@ class Halves final {
 };
 
 /** How far two boxes are from each other, squared. What is not a number is no distance, nor is what is too small or too
-large for its square. @param lower, upper have kMaxSafetyDim ends of the other one. */
-template <class Ends>
-[[nodiscard]] FOREREACH_INLINE double SquareOfDistance(const HullTree::Node& a, const Ends& lower,
-                                                       const Ends& upper) noexcept {
-  double square = 0;
-  for (std::size_t k = 0; k < kMaxSafetyDim; ++k) {
-    const double below = lower[k] - a.upper[k], above = a.lower[k] - upper[k];
-    const double larger = below > above ? below : above, gap = larger > 0 ? larger : 0;  // NaN: 0
-    square += gap * gap;
-  }
+large for its square. @param lower, upper the ends of the other one. */
+[[nodiscard]] FOREREACH_INLINE double SquareOfDistance(const HullTree::Node& a, const Lanes& lower,
+                                                       const Lanes& upper) noexcept {
+  const Lanes gap = Max(Max(lower - LoadLanes(a.upper.data()), LoadLanes(a.lower.data()) - upper), AllLanes(0));
+  const double square = Sum(gap * gap);  // NaN: 0
   return square > 0x1p-800 && square < kInfinity ? square : 0;
 }
 
@@ -172,13 +167,25 @@ class BoxTree final {
   /** Calls visit(t, i) for hulls t and boxes i, each pair at most once and about from near to far. A pair that is left
   out is further apart than `reach` + `within()`, by more than what SeparateHulls may lose by rounding. `within()` is
   asked on the way and may fall; what is below 0 counts as 0. It allocates nothing. Cost about O(log n + pairs
-  visited). */
-  template <class Within, class Visit>
-  void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit) const {
+  visited). @param gap gap(t, lower, upper) is a lower bound, up to such rounding, on what hull t's own set is from the
+  box with these ends; it may be closer to the distance than that of the hull. Negative: nothing is known. */
+  template <class Within, class Visit, class Gap>
+  void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit,
+                   const Gap& gap) const {
     halves_.Search(
         hulls,
-        [](const HullTree::Node& some, const Node& node) { return SquareOfDistance(some, node.lower, node.upper); },
+        [&](const HullTree::Node& some, const Node& node, double most) __attribute__((always_inline)) {
+          const Lanes lower = LoadLanes(node.lower.data()), upper = LoadLanes(node.upper.data());
+          const double square = SquareOfDistance(some, lower, upper);
+          if (some.count > 1 || square > most) return square;
+          const double own = gap(some.first, lower, upper);
+          return own > 0 && own * own > square ? own * own : square;
+        },
         FarBy(kHair * (size_ + hulls.size() + reach), reach, within), visit);
+  }
+  template <class Within, class Visit>
+  void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit) const {
+    ForEachNear(hulls, reach, within, visit, [](int, const Lanes&, const Lanes&) { return -1.0; });
   }
   /** How far nodes have to be from each other to be left out. */
   template <class Within>

@@ -33,7 +33,8 @@ class MotionTree final {
                    const Visit& visit) const {
     const double hair = BoxTree::kHair * (SizeIn(times) + hulls.size() + reach);
     halves_.Search(
-        hulls, [&](const HullTree::Node& some, const Node& node) { return SquareOfDistanceIn(times, some, node); },
+        hulls,
+        [&](const HullTree::Node& some, const Node& node, double) { return SquareOfDistanceIn(times, some, node); },
         BoxTree::FarBy(hair, reach, within), visit);
   }
 

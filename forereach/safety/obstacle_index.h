@@ -25,12 +25,15 @@ class ObstacleIndex final {
   /** An upper bound on the absolute values of the coordinates of those that stand, and on their radii. */
   [[nodiscard]] double size() const { return size_; }
   /** BoxTree::ForEachNear of those that stand: visit(t, o). One that is left out is proven apart by SeparateHulls, with
-  `reach` added, and its clearance there exceeds `within()`. */
-  template <class Within, class Visit>
-  void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit) const {
-    tree_.ForEachNear(hulls, reach, within, [&](int t, int i) { visit(t, standing_[ToSize(i)]); });
-    for (const auto& [first, grid] : grids_)
-      tree_of(*grid).ForEachNear(hulls, reach, within, [&, from = first](int t, int i) { visit(t, from + i); });
+  `reach` added, and its clearance there exceeds `within()`; or by its `gap`, if that is given. */
+  template <class Within, class Visit, class... Gap>
+  void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit,
+                   const Gap&... gap) const {
+    for (std::size_t g = 0; g <= grids_.size(); ++g) {
+      const Grid* const grid = g < grids_.size() ? &grids_[g] : nullptr;
+      const auto see = [&](int t, int i) { visit(t, grid != nullptr ? grid->first + i : standing_[ToSize(i)]); };
+      (grid != nullptr ? tree_of(*grid->grid) : tree_).ForEachNear(hulls, reach, within, see, gap...);
+    }
   }
 
   [[nodiscard]] bool has_moving() const { return !moving_.empty(); }

@@ -155,6 +155,7 @@ Placement::Placement(const Eigen::MatrixXd& projection, const Body& body, const 
           {q, length, turned, length + std::abs(q[2]) + turned + std::max({bulge_[0], bulge_[1], bulge_[2]})});
       reach_ = std::max(reach_, AddUp(AddUp(LengthUpper(q[0], q[1], q[2]), points_.back().turn), part.radius));
     }
+    FindSides(parts_.back());
   }
   Require(reach_ < kInfinity, "body: its size is not finite");
   Require(!has_frame_ || !projection_.entries().empty(), "projection: is zero");
@@ -187,41 +188,67 @@ void Placement::EncloseHull(const Sample& sample, Hull& hull) const noexcept {
   }
 }
 
-// |R(theta) q - R(c) q| <= |q| |theta - c|.
-Placement::Pose Placement::PoseOver(const Zonotope& slice, std::span<const double> half_width) const noexcept {
-  Pose pose;
+// |R(theta) q - R(c) q| <= |q| r, and what OverSlice adds to it is of the second order: in each coordinate at most
+// (|q| + |q| r + |q| r^2 / 2) r^2 / 2.
+void Placement::PoseOver(const Zonotope& slice, std::span<const double> half_width, Pose& pose) const noexcept {
   EncloseHull(slice, half_width, pose.frame);
   const Rotation rotation(heading_, slice, half_width);
   pose.cosine = rotation.cosine;
   pose.sine = rotation.sine;
-  pose.turn = rotation.half_width < kInfinity ? rotation.half_width : kInfinity;
-  return pose;
+  const double r = rotation.half_width, half_square = 0.5 * r * r, turn = r + 1.5 * half_square * (1 + r + half_square);
+  double size = turn + reach_;
+  const auto& c = pose.frame.center;
+  for (std::size_t k = 0; k < ToSize(dim()); ++k) size += std::abs(c[k]) + pose.frame.half_width[k];
+  pose.is_known = size < 0x1p400;  // NaN is not
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Point& point = points_[i];
+    const Eigen::Vector3d& q = point.place;
+    pose.middle[0][i] = c[0] + (pose.cosine * q[0] - pose.sine * q[1]);
+    pose.middle[1][i] = c[1] + (pose.sine * q[0] + pose.cosine * q[1]);
+    pose.middle[2][i] = c[2] + q[2];
+    pose.around[i] = point.length * turn + point.turn;
+  }
 }
 
 Hull Placement::EncloseBody(const Pose& pose) const noexcept {
+  Hull hull{};
   std::array<double, kMaxSafetyDim> lower, upper;
   lower.fill(kInfinity);
   upper.fill(-kInfinity);
   double size = 0;
   for (const Part& part : parts_)
-    for (int i = part.first; i < part.first + part.count; ++i) {
-      const auto middle = Middle(pose, i);
-      const double around = Around(pose, i) + part.radius;
+    for (std::size_t i = ToSize(part.first); i < ToSize(part.first + part.count); ++i) {
+      const double around = pose.around[i] + part.radius;
       for (std::size_t k = 0; k < ToSize(dim()); ++k) {
-        lower[k] = std::min(lower[k], middle[k] - around);
-        upper[k] = std::max(upper[k], middle[k] + around);
+        lower[k] = std::min(lower[k], pose.middle[k][i] - around);
+        upper[k] = std::max(upper[k], pose.middle[k][i] + around);
       }
-      size = std::max(size, points_[ToSize(i)].size + around);
+      size = std::max(size, points_[i].size + around);
     }
-  Hull hull{};
   for (std::size_t k = 0; k < ToSize(dim()); ++k) {
     const auto& [center, half_width] = pose.frame;
-    const bool is_known = pose.turn < kInfinity && std::abs(center[k]) < kInfinity;
     const double slack = RoundingError(kPlaceMargin, std::abs(center[k]) + half_width[k] + size) + kLeastNormal;
-    hull.center[k] = is_known ? 0.5 * (lower[k] + upper[k]) : 0;
-    hull.half_width[k] = is_known ? 0.5 * (upper[k] - lower[k]) + half_width[k] + slack : kInfinity;
+    hull.center[k] = pose.is_known ? 0.5 * (lower[k] + upper[k]) : 0;
+    hull.half_width[k] = pose.is_known ? 0.5 * (upper[k] - lower[k]) + half_width[k] + slack : kInfinity;
   }
   return hull;
+}
+
+// Points in the order of the clock have their sides' normals turned round.
+void Placement::FindSides(const Part& part) noexcept {
+  if (part.count == 1 || dim() != 2) return;
+  const auto next = [&](int i) { return ToSize(i + 1 < part.first + part.count ? i + 1 : part.first); };
+  double area = 0;
+  for (int i = part.first; i < part.first + part.count; ++i) {
+    const Eigen::Vector3d &a = points_[ToSize(i)].place, &b = points_[next(i)].place;
+    area += a[0] * b[1] - a[1] * b[0];
+  }
+  for (int i = part.first; i < part.first + part.count; ++i) {
+    const Eigen::Vector3d edge = points_[next(i)].place - points_[ToSize(i)].place;
+    const double length = edge.norm(),
+                 scale = length > 0x1p-300 && length < 0x1p300 ? std::copysign(1 / length, area) : 0;
+    points_[ToSize(i)].side = {scale * edge[1], -scale * edge[0]};
+  }
 }
 
 // A place without a finite second order is the box of the ranges; where a coordinate has none, there may be no place at
@@ -420,6 +447,15 @@ void Placement::EncloseInline(const Sample& sample, Zonotope* places) const noex
     for (int i = 0; i < num_points(); ++i) projection_.Enclose(slice, sample.half_width, places[i]);
     return;
   }
+  const std::size_t columns = slice.padded_size(), p = ToSize(dim());
+  alignas(32) std::array<std::array<double, kMaxGenerators>, kMaxSafetyDim> frame;  // P G
+  for (std::size_t row = 0; has_frame_ && row < p; ++row)
+    for (std::size_t j = 0; j < columns; j += kLaneCount) {
+      Lanes sum = AllLanes(0);
+      for (const MatrixEntry& entry : rows_[row])
+        sum += AllLanes(entry.value.lower) * LoadLanes(slice.padded_row(entry.column).data() + j);
+      StoreLanes(sum, &frame[row][j]);
+    }
   for (std::size_t i = 0; i < points_.size(); ++i) {
     if (points_[i].linear >= 0) {
       EncloseAtExpressions(sample, i, places[i]);
@@ -430,12 +466,11 @@ void Placement::EncloseInline(const Sample& sample, Zonotope* places) const noex
     ArraysOf(place).Reset(dim(), slice.num_generators());
     for (int k = 0; k < dim(); ++k) {
       const auto row = ToSize(k);
-      for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
-        Lanes sum = AllLanes(0);
-        for (const MatrixEntry& entry : rows_[row])
-          sum += AllLanes(entry.value.lower) * LoadLanes(slice.padded_row(entry.column).data() + j);
-        if (point.slope[row] != 0) sum += AllLanes(point.slope[row]) * LoadLanes(slice.padded_row(heading_).data() + j);
-        StoreLanes(sum, ArraysOf(place).mutable_row(k) + j);
+      const double slope = point.slope[row], *turned = slope != 0 ? slice.padded_row(heading_).data() : nullptr;
+      double* to = ArraysOf(place).mutable_row(k);
+      for (std::size_t j = 0; j < columns; j += kLaneCount) {
+        const Lanes sum = LoadLanes(&frame[row][j]);
+        StoreLanes(turned == nullptr ? sum : sum + AllLanes(slope) * LoadLanes(turned + j), to + j);
       }
       ArraysOf(place).mutable_center(k) = sample.center[row] + point.offset[row];
       ArraysOf(place).mutable_slack(k) = 0;

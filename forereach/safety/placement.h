@@ -60,26 +60,25 @@ class Placement final {
   Box(X). Cost O(nonzeros of P). @pre no point stands at expressions. */
   void EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept;
 
-  /** Where the body is over one slice, loosely: the box around its frame, and its heading up to `turn` radians. Point i
-  lies in Middle(pose, i) + [-w, w] + {|y| <= Around(pose, i)}, with w the frame's half-widths, up to rounding. */
+  /** Where the body is over one slice, loosely: the place of point i, as Enclose gives it, lies in middle[.][i] + [-w,
+  w] + {|y| <= around[i]}, with w the frame's half-widths, up to rounding. */
   struct Pose {
     Hull frame;
-    double cosine, sine, turn;  ///< infinite where nothing is known
+    double cosine, sine;
+    bool is_known;  ///< Otherwise the points may be anywhere.
+    std::array<std::array<double, kMaxBodyPoints>, kMaxSafetyDim> middle;
+    std::array<double, kMaxBodyPoints> around;
   };
-  /** Cost O(nonzeros of P), a sine and a cosine. @pre no point stands at expressions. */
-  [[nodiscard]] Pose PoseOver(const Zonotope& slice, std::span<const double> half_width) const noexcept;
-  [[nodiscard]] std::array<double, kMaxSafetyDim> Middle(const Pose& pose, int i) const noexcept {
-    const Eigen::Vector3d& q = points_[ToSize(i)].place;
-    const auto& c = pose.frame.center;
-    return {c[0] + (pose.cosine * q[0] - pose.sine * q[1]),
-            dim() > 1 ? c[1] + (pose.sine * q[0] + pose.cosine * q[1]) : 0, dim() > 2 ? c[2] + q[2] : 0};
-  }
-  [[nodiscard]] double Around(const Pose& pose, int i) const noexcept {
-    const Point& point = points_[ToSize(i)];
-    return (point.length > 0 ? point.length * pose.turn : 0) + point.turn;
-  }
+  /** Cost O(nonzeros of P), O(1) for each point, a sine and a cosine. @pre no point stands at expressions. */
+  void PoseOver(const Zonotope& slice, std::span<const double> half_width, Pose& pose) const noexcept;
   /** A hull that contains all of the body there. Cost O(points). */
   [[nodiscard]] Hull EncloseBody(const Pose& pose) const noexcept;
+  /** The outward normal, of length 1, of the side from point i to the next of its part, p = 2, at the pose; zero if it
+  has no length. */
+  [[nodiscard]] std::array<double, 2> Side(const Pose& pose, int i) const noexcept {
+    const auto& [x, y] = points_[ToSize(i)].side;
+    return {pose.cosine * x - pose.sine * y, pose.sine * x + pose.cosine * y};
+  }
 
   /** The linear map and what is left over of every g_i over one slice: what all bounds on places are made of. */
   struct Sample {
@@ -132,14 +131,16 @@ class Placement final {
     Eigen::Vector3d place;  // in the robot's frame
     double length;          // |q| in the plane in which the body turns, from above
     double turn;
-    double size;      // of these and the bulge
-    int linear = -1;  // at expressions: their place in Sample::linear
+    double size;                   // of these and the bulge
+    int linear = -1;               // at expressions: their place in Sample::linear
+    std::array<double, 2> side{};  // as Side, in the robot's frame
   };
 
   struct Rotation;
 
   void OverSlice(const Point& point, const Rotation& rotation, Sample::Point& over) const noexcept;
   void OverSlice(Sample& sample, std::size_t i) const noexcept;
+  void FindSides(const Part& part) noexcept;
   FOREREACH_INLINE double SupportInline(const Sample& sample, const Part& part,
                                         const Eigen::Vector3d& d) const noexcept;
   FOREREACH_INLINE void EncloseInline(const Sample& sample, Zonotope* places) const noexcept;

@@ -83,6 +83,17 @@ class DirectionSearch {
       centers_[i].setZero();
       for (int k = 0; k < dim(); ++k) centers_[i][k] = pieces[i].set->center(k) - pieces[i].shift[ToSize(k)].Middle();
     }
+    if (pieces.size() > 1 && !hull_.empty()) Measure(obstacle);
+  }
+
+  // The piece of the best value, among several.
+  [[nodiscard]] std::size_t nearest() const { return nearest_; }
+  // Whether the dual bound of a piece along d, of length 1, exceeds `value` by more than all rounding: that of the box
+  // around it does. Numbers that are none are sure of nothing.
+  [[nodiscard]] bool IsFarther(std::size_t i, const Vector& d, double value) const noexcept {
+    double core = kInfinity;
+    for (const Vector& point : hull_) core = std::min(core, d.dot(point));
+    return IsBoxAbove(i, d, core - d.dot(centers_[i]) - pieces_[i].ball, value);
   }
 
   [[nodiscard]] int dim() const { return pieces_.front().set->dim(); }
@@ -113,16 +124,24 @@ class DirectionSearch {
     for (const Vector& point : hull_)
       if (d.dot(point) < d.dot(lowest)) lowest = point;
     Vector first = Vector::Zero();
-    double value = kInfinity;
+    double value = kInfinity, most = kInfinity;  // the value is not above that of a piece's center
+    std::size_t number = 0;
+    std::array<double, kMaxPieces> of_center;
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      of_center[i] = d.dot(lowest - centers_[i]) - pieces_[i].ball;
+      most = std::min(most, of_center[i]);
+    }
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      if (pieces_.size() > 1 && IsBoxAbove(i, d, of_center[i], std::min(value, most))) continue;
       const auto [offset, spread] = Farthest(*pieces_[i].set, d);
       const Vector towards = lowest - centers_[i];
       if (const double its_value = d.dot(towards) - spread - pieces_[i].ball; its_value < value) {
         value = its_value;
         first = towards - offset - pieces_[i].ball * d;
+        number = i;
       }
     }
-    Keep(d, value);
+    if (Keep(d, value)) nearest_ = number;
     return first;
   }
 
@@ -190,17 +209,42 @@ class DirectionSearch {
     Keep(d, value);
   }
 
-  void Keep(const Vector& d, double value) noexcept {
-    if (!(value > value_)) return;
+  bool Keep(const Vector& d, double value) noexcept {
+    if (!(value > value_)) return false;
     value_ = value;
     best_ = d;
+    return true;
+  }
+
+  // The half-widths of the boxes around the pieces, and a margin that is far above all rounding here and in
+  // PlainDistanceLower: docs/soundness.md, 3.9, bound 3.
+  void Measure(const Obstacle& obstacle) noexcept {
+    double size = obstacle.lower().cwiseAbs().sum() + obstacle.upper().cwiseAbs().sum();
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      const Zonotope& set = *pieces_[i].set;
+      widths_[i].setZero();
+      for (int k = 0; k < dim(); ++k) {
+        const Interval& shift = pieces_[i].shift[ToSize(k)];
+        const double* row = set.padded_row(k).data();
+        Lanes sum = AllLanes(0);
+        for (std::size_t j = 0, end = set.padded_size(); j < end; j += kLaneCount) sum += Abs(LoadLanes(row + j));
+        widths_[i][k] = Sum(sum) + set.slack(k) + (shift.upper - shift.lower);
+        size += std::abs(set.center(k)) + shift.Magnitude() + widths_[i][k];
+      }
+      size += pieces_[i].ball;
+    }
+    margin_ = 0x1p-40 * size;
+  }
+  [[nodiscard]] bool IsBoxAbove(std::size_t i, const Vector& d, double of_center, double value) const noexcept {
+    return of_center - d.cwiseAbs().dot(widths_[i]) > value + margin_;
   }
 
   std::span<const Piece> pieces_;
   const std::vector<Vector>& hull_;
-  std::array<Vector, kMaxPieces> centers_;
+  std::array<Vector, kMaxPieces> centers_, widths_;  // the latter of several
   Vector best_ = Vector::UnitX();
-  double value_ = -kInfinity;
+  double value_ = -kInfinity, margin_ = 0;
+  std::size_t nearest_ = 0;
 };
 
 Vector Turned(const Vector& edge) { return {-edge.y(), edge.x(), 0}; }
@@ -290,8 +334,8 @@ void DescendInSpace(DirectionSearch& search, const Effort& effort) noexcept {
   search.Consider(search.Corner(normal, -Turned(normal)));
 }
 
-Vector BestPlanar(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold, double enough) noexcept {
-  DirectionSearch search(pieces, obstacle);
+Vector BestPlanar(DirectionSearch& search, std::span<const Piece> pieces, const Obstacle& obstacle, double threshold,
+                  double enough) noexcept {
   DescendInPlane(search, Effort::For(pieces, threshold, enough));
   if (pieces.size() == 1 && !(search.value() > threshold)) TryAllNormals(search, obstacle.hull());
   return search.best();
@@ -299,9 +343,8 @@ Vector BestPlanar(std::span<const Piece> pieces, const Obstacle& obstacle, doubl
 
 // In space disjoint polytopes are separated by a face normal of one, or the cross product of an edge of each. The edges
 // of a box are the axes; the faces of a zonotope lie along pairs of generators.
-[[gnu::noinline]] Vector BestSpatial(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold,
+[[gnu::noinline]] Vector BestSpatial(DirectionSearch& search, std::span<const Piece> pieces, double threshold,
                                      double enough) noexcept {
-  DirectionSearch search(pieces, obstacle);
   for (int k = 0; k < 3; ++k) search.Consider(Vector::Unit(k));
   DescendInSpace(search, {50, 1e-7, threshold, enough});
   if (pieces.size() > 1 || search.value() > threshold) return search.best();
@@ -313,7 +356,7 @@ Vector BestPlanar(std::span<const Piece> pieces, const Obstacle& obstacle, doubl
   return search.best();
 }
 
-Vector BestDirection(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold,
+Vector BestDirection(DirectionSearch& search, std::span<const Piece> pieces, const Obstacle& obstacle, double threshold,
                      double enough) noexcept {
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
     Vector normal = Vector::Zero();
@@ -323,12 +366,11 @@ Vector BestDirection(std::span<const Piece> pieces, const Obstacle& obstacle, do
   if (obstacle.hull().empty()) return Vector::Zero();  // of a grid: proves nothing
   switch (obstacle.dim()) {
     case 1: {
-      DirectionSearch search(pieces, obstacle);
       search.Consider(Vector::UnitX());
       return search.best();
     }
-    case 2: return BestPlanar(pieces, obstacle, threshold, enough);
-    case 3: return BestSpatial(pieces, obstacle, threshold, enough);
+    case 2: return BestPlanar(search, pieces, obstacle, threshold, enough);
+    case 3: return BestSpatial(search, pieces, threshold, enough);
     default: return Vector::Zero();  // proves nothing
   }
 }
@@ -415,10 +457,15 @@ FOREREACH_INLINE double LeastOf(std::span<const Piece> pieces, Bound bound) noex
 
 FOREREACH_INLINE Separation SeparateInline(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold,
                                            double enough) noexcept {
-  const Vector direction = BestDirection(pieces, obstacle, threshold, enough);
+  DirectionSearch search(pieces, obstacle);
+  const Vector direction = BestDirection(search, pieces, obstacle, threshold, enough);
   if (obstacle.kind() != Obstacle::Kind::kHalfSpace && std::abs(direction.squaredNorm() - 1) < 0x1p-46) {
-    const auto plain = [&](const Piece& piece) __attribute__((always_inline)) {
-      return PlainDistanceLower(piece, obstacle, direction);
+    const double nearest = PlainDistanceLower(pieces[search.nearest()], obstacle, direction);
+    const auto plain = [&](const Piece& piece) {
+      const auto i = ToSize(&piece - pieces.data());
+      return i == search.nearest() || search.IsFarther(i, direction, nearest)
+                 ? nearest
+                 : PlainDistanceLower(piece, obstacle, direction);
     };
     if (const Separation found{LeastOf(pieces, plain), threshold}; found.IsProven()) return found;
   }

@@ -51,20 +51,36 @@ TEST(BoxTree, LeavesOutOnlyWhatIsFurtherThanAsked) {
         hull.half_width[k] = random.Coin(0.3) ? 0 : scale * random.Uniform(0, 0.3);
       }
     const double reach = random.Coin() ? 0 : scale * random.Uniform(0, 0.2), within = scale * random.Uniform(-0.1, 0.5);
+    // The sets themselves are what is within half of their hulls' widths.
+    const bool has_sets = random.Coin();
+    std::vector<Hull> sets = hulls;
+    for (Hull& set : sets)
+      for (std::size_t k = 0; has_sets && k < ToSize(dim); ++k) set.half_width[k] /= 2;
+    const auto gap = [&](int t, const Lanes& lower, const Lanes& upper) {
+      if (!has_sets) return -1.0;
+      double square = 0;
+      for (std::size_t k = 0; k < ToSize(dim); ++k) {
+        const auto& [center, half_width] = sets[ToSize(t)];
+        const double apart = std::max(lower[k] - center[k], center[k] - upper[k]) - half_width[k];
+        if (apart > 0) square += apart * apart;
+      }
+      return std::sqrt(square);
+    };
     std::map<std::pair<int, int>, int> visits;
     BoxTree(boxes, dim)
         .ForEachNear(
             TreeOf(hulls, dim), reach, [&] { return within; },
             [&](int t, int i) {
               ++visits[{t, i}];
-            });
+            },
+            gap);
     const Rational most = Rational(reach) + Rational(std::max(within, 0.0));
     for (int t = 0; t < std::ssize(hulls); ++t)
       for (int i = 0; i < count; ++i) {
         EXPECT_LE((visits[{t, i}]), 1);
         if (visits[{t, i}] > 0) continue;
         ++left_out;
-        EXPECT_GT(SquareOfGap(boxes[ToSize(i)], hulls[ToSize(t)], dim), most * most) << "hull " << t << ", box " << i;
+        EXPECT_GT(SquareOfGap(boxes[ToSize(i)], sets[ToSize(t)], dim), most * most) << "hull " << t << ", box " << i;
       }
   }
   EXPECT_GT(left_out, 1000) << "a tree that visits all shows nothing";
@@ -396,6 +412,42 @@ TEST(ObstacleIndex, FindsTheOneThatIsTouchedAmongThousands) {
   const Decision found = certifier.Certify(plan, set, {cells, index}, tube);
   EXPECT_FIELDS(found, (outcome, Outcome::kSafety), (obstacle, 3000), (step, 4));
   ExpectSame(found, certifier.Certify(plan, set, cells, tube));
+}
+
+// A long body that may turn: its sides leave out what the box around it meets.
+TEST(ObstacleIndex, ChangesNoDecisionBesideALongBodyThatTurns) {
+  TracedRandom random(7);
+  int certified = 0, touched = 0;
+  for (int drives = 0; drives < 40;) {
+    Problem problem = *AnyWorld(random, true);
+    const double length = random.Uniform(0.5, 4), width = random.Uniform(0, 1), ahead = random.Uniform(-1, 3);
+    problem.projection = Eigen::MatrixXd::Identity(2, problem.model->num_states());
+    problem.between.reset();
+    if (random.Coin()) problem.between = AnyBetween(random, 2, 0.1);
+    problem.body = {2, {{{{ahead + length, width, 0}, {ahead - length, width, 0}, {ahead - length, -width, 0}}, 0}}};
+    if (random.Coin()) problem.body.parts[0].points.push_back({ahead + length, -width, 0});
+    if (random.Coin(0.3)) std::ranges::reverse(problem.body.parts[0].points);
+    if (random.Coin(0.3)) problem.body.parts.push_back({{{-length, 0, 0}, {length, 0, 0}}, 0.3});
+    const Certifier certifier(std::make_shared<Problem>(problem));
+    Query query = AnyDrive(random, problem);
+    Tube tube;
+    if (certifier.Certify(query.plan(), query.initial_set, {}, tube).outcome != Outcome::kCertified) continue;
+    ++drives;
+    std::vector<Obstacle> all;
+    for (int i = 0; i < 400; ++i) {
+      const Eigen::VectorXd corner = (random.Vector(2, 8) * 4).array().floor() / 4;
+      const Obstacle some = random.Coin(0.8) ? Obstacle::AxisBox(corner, corner.array() + 0.25)
+                                             : Obstacle::Circle(corner, random.Uniform(0, 0.3));
+      const Decision alone = certifier.JudgeSafety(query.plan(), {&some, 1}, tube);
+      if (alone.outcome == Outcome::kCertified || random.Coin(0.01)) all.push_back(some);
+    }
+    const ObstacleIndex index(all);
+    const Decision plain = certifier.JudgeSafety(query.plan(), all, tube);
+    ExpectSame(certifier.JudgeSafety(query.plan(), {all, index}, tube), plain);
+    (plain.outcome == Outcome::kCertified ? certified : touched) += 1;
+  }
+  EXPECT_GT(certified, 10);
+  EXPECT_GT(touched, 3);
 }
 
 // A long body: hulls prove none of the cells beside it apart, and there are more of them than the index keeps at once.

@@ -395,6 +395,9 @@ TEST(Body, TheSupportOfAPartContainsItsPlaces) {
     placement.Observe(slice, half_width, sample);
     std::vector<Zonotope> places(3);
     placement.Enclose(sample, places.data());
+    Placement::Pose pose;
+    placement.PoseOver(slice, half_width, pose);
+    EXPECT_TRUE(pose.is_known);
     const double scale = std::exp2(uniform(-20, 20));
     const Vector3d d(scale * uniform(-1, 1), scale * uniform(-1, 1), 0);
     for (const Placement::Part& part : placement.parts()) {
@@ -404,6 +407,12 @@ TEST(Body, TheSupportOfAPartContainsItsPlaces) {
         of_places = std::max(
             of_places, places[static_cast<std::size_t>(i)].SupportUpper({d.data(), 2}) + d.norm() * placement.turn(i));
       EXPECT_NEAR(support, of_places, 1e-11 * scale) << round;
+      const auto& width = pose.frame.half_width;
+      double of_pose = -kInfinity;
+      for (std::size_t i = ToSize(part.first); i < ToSize(part.first + part.count); ++i)
+        of_pose = std::max(of_pose, d[0] * pose.middle[0][i] + d[1] * pose.middle[1][i] + d.norm() * pose.around[i] +
+                                        std::abs(d[0]) * width[0] + std::abs(d[1]) * width[1]);
+      EXPECT_GE(of_pose, of_places - 1e-11 * scale) << round;
       EXPECT_EQ(placement.SupportUpper(sample, part, d, InstructionSet::kBaseline), support);
       const BodyPart& points = body.parts[part.first == 0 ? 0 : 1];
       for (int trial = 0; trial < 20; ++trial) {
@@ -427,6 +436,25 @@ TEST(Body, SupportIsUnboundedForAVeryLargeHeading) {
     const auto slice = Zonotope::FromBox(Vec({0, 0, heading}), Vec({0, 0, 0}));
     placement.Observe(slice, half_width, sample);
     EXPECT_EQ(placement.SupportUpper(sample, placement.parts()[0], Vector3d(1, 0, 0)) < 2, heading == 0x1p20);
+    Placement::Pose pose;
+    placement.PoseOver(slice, half_width, pose);
+    EXPECT_EQ(pose.is_known, heading == 0x1p20);
+  }
+}
+
+TEST(Body, ItsSidesPointOutward) {
+  std::vector<Vector3d> points{{3, 1, 0}, {-1, 2, 0}, {-2, -1, 0}, {2, -1, 0}};
+  for (int order = 0; order < 2; ++order, std::ranges::reverse(points)) {
+    const Placement placement(Eigen::MatrixXd::Identity(2, 3), Parts({{points, 0}}, 2), std::nullopt, 3);
+    Placement::Pose pose;
+    placement.PoseOver(Zonotope::FromBox(Vec({5, 6, 0.7}), Vec({0, 0, 0})), std::array<double, 3>{}, pose);
+    for (int i = 0; i < 4; ++i) {
+      const auto [x, y] = placement.Side(pose, i);
+      EXPECT_NEAR(std::hypot(x, y), 1, 1e-15);
+      const auto along = [&](int j) { return x * pose.middle[0][ToSize(j)] + y * pose.middle[1][ToSize(j)]; };
+      EXPECT_NEAR(along(i), along((i + 1) % 4), 1e-14);
+      EXPECT_LT(along((i + 2) % 4), along(i) - 0.5);
+    }
   }
 }
 
