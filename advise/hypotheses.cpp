@@ -156,10 +156,10 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
                                           config.gate.learns ? "and of the bus " : "");
   const auto& [rows, columns, rest] = declaration.affine;
   if (!rows.empty())
-    all.push_back({fmt::format("the residual of {} is affine in {}{}, on the whole domain",
-                               NamesOf(model.state_names(), rows), NamesOf(model.variable_names(), columns),
-                               rest.isZero(0) ? "" : " up to declaration.affine.rest"),
-                   falsify});
+    all.push_back(
+        {fmt::format("the residual of {} is affine in {}{}, on the whole domain", NamesOf(model.state_names(), rows),
+                     NamesOf(model.variable_names(), columns), rest.isZero(0) ? "" : " up to declaration.affine.rest"),
+         falsify});
   if (std::ssize(rows) < model.num_states())
     all.push_back({rows.empty() ? "the residual changes by no more than declaration.lipschitz, on the whole domain"
                                 : "that of the other states changes by no more than declaration.lipschitz, likewise",

@@ -14,6 +14,13 @@ namespace {
 constexpr int kPatternsPerLeaf = 64;
 constexpr double kHuge = 0x1p960;  // far from overflow, and nothing next to the largest double
 
+// The least power of two >= x; infinity if x is huge. @pre x >= 0.
+double PowerOfTwoUp(double x) {
+  if (!(x < kHuge)) return kInfinity;
+  int exponent = 0;
+  return std::frexp(x, &exponent) > 0.5 ? std::ldexp(1, exponent) : x;
+}
+
 }  // namespace
 
 template <class Rows>
@@ -30,46 +37,54 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Rows&
     constant_lower_[ToSize(k)] = row.floor;
     constant_upper_[ToSize(k)] = -row.negated_ceiling;
     if (row.distance.is_constant()) continue;
-    BoundErrors(row, entries, observations, domain_lower, domain_upper);
-    row.index = ObservationIndex(entries);
-    if (std::isfinite(row.error)) {
-      active_.push_back(k);
-    } else {  // nothing bounds the rounding
-      constant_lower_[ToSize(k)] = -kInfinity;
-      constant_upper_[ToSize(k)] = kInfinity;
-    }
+    active_.push_back(k);
+    Measure(row, observations, domain_lower, domain_upper);
+    RaiseLimit(k, LargestValue(entries));
+    row.index = std::make_shared<const ObservationIndex>(entries);
   }
 }
 
 template LipschitzEnvelope::LipschitzEnvelope(const Declaration&, const Observations&, std::span<const double>,
                                               std::span<const double>, const EnvelopeOptions&);
-template LipschitzEnvelope::LipschitzEnvelope(const Declaration&, const ObservationRows&, std::span<const double>,
+template LipschitzEnvelope::LipschitzEnvelope(const Declaration&, const LastRows&, std::span<const double>,
                                               std::span<const double>, const EnvelopeOptions&);
 
-// Sets row.error, E_k of the header. It bounds the rounding of every answer before there is a query, since a query's
-// hull lies in the domain; docs/soundness.md, 3.5, counts the a + 24 roundings and the products that may underflow.
+// Sets S and W of the header.
 template <class Rows>
-void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Rows& observations,
-                                    std::span<const double> domain_lower, std::span<const double> domain_upper) const {
-  double locations = 0, widths = 0;  // S, W
+void LipschitzEnvelope::Measure(Row& row, const Rows& observations, std::span<const double> domain_lower,
+                                std::span<const double> domain_upper) {
   for (const LipschitzRow::Column& column : row.distance.columns()) {
     const auto l = ToSize(column.variable);
     double farthest = std::max(std::abs(domain_lower[l]), std::abs(domain_upper[l]));
     for (int i = 0; i < observations.size(); ++i)
       farthest = std::max(farthest, std::abs(observations.z(i, column.variable)));
     const double width = Interval(domain_lower[l], domain_upper[l]).HalfWidthUpper();
-    locations = AddUp(locations, MulUp(column.slope, farthest));
-    if (column.variable < observations.num_states()) widths = AddUp(widths, MulUp(column.slope, width));
+    row.locations = AddUp(row.locations, MulUp(column.slope, farthest));
+    if (column.variable < observations.num_states()) row.widths = AddUp(row.widths, MulUp(column.slope, width));
     // L c and L z are rounded products, v their rounded difference; L r <= 2 L farthest is a rounded product.
     row.component_errors.push_back(PlainErrorUpper(MulUp(4, MulUp(column.slope, farthest)), 4, 4));
   }
+}
+
+// Sets V and E_k of the header. E_k bounds the rounding of every answer before there is a query, since a query's hull
+// lies in the domain; docs/soundness.md, 3.5, counts the a + 24 roundings and the products that may underflow.
+void LipschitzEnvelope::RaiseLimit(int k, double value) {
+  Row& row = rows_[ToSize(k)];
+  row.value_limit = std::max(row.value_limit, PowerOfTwoUp(value));
   const auto a = static_cast<int>(row.distance.columns().size());
-  row.value_limit = MulUp(options_.value_headroom, LargestValue(entries));
-  const double magnitude = AddUp(AddUp(row.value_limit, MulUp(2, locations)), MulUp(3, widths));
+  const double magnitude = AddUp(AddUp(row.value_limit, MulUp(2, row.locations)), MulUp(3, row.widths));
   row.error = PlainErrorUpper(magnitude, a + 24, a * (kMaxGenerators + 4));
+  row.pair_margin = PairMarginUpper(row.value_limit, row.locations, row.distance.columns().size());
+  if (magnitude < kHuge) return;
   // Where a sum may overflow, no rounding bound holds: the row then has no finite bound, and the answer is D.
-  if (!(magnitude < kHuge)) row.error = kInfinity;
-  row.pair_margin = PairMarginUpper(row.value_limit, locations, row.distance.columns().size());
+  row.error = kInfinity;
+  std::erase(active_, k);
+  constant_lower_[ToSize(k)] = -kInfinity;
+  constant_upper_[ToSize(k)] = kInfinity;
+}
+
+void LipschitzEnvelope::RaiseLimits(std::span<const double> values) {
+  for (const int k : std::vector<int>(active_)) RaiseLimit(k, values[ToSize(k)]);
 }
 
 using internal::Budget;
@@ -105,7 +120,7 @@ struct LipschitzEnvelope::BoundSearch {
 
   template <class Metric>
   [[nodiscard]] Sides Best(const Metric& metric, std::size_t i, const Row& row, Budget& budget) const {
-    const ObservationIndex& index = row.index;
+    const ObservationIndex& index = *row.index;
     Sides best{-kInfinity, -kInfinity};
     if (index.num_blocks() <= MaxFlatBlocks<Metric>())
       best = ScanBlocks(metric, index.block(0), index.num_blocks(), best, budget);

@@ -7,8 +7,9 @@ Rounding. A query runs in plain arithmetic; its error is bounded before there is
 query's hull lies in the certification domain. The computed bound is an expression of sums, products of two, |.| and max
 whose leaves are r~_ik -+ eps_k (rounded outward once, then taken as exact), L_kl c_l, L_kl z_il, L_kl G_lj and L_kl
 s_l. Over all queries their magnitudes add up to at most
-    V + 2 S + 3 W,   V = max_i |r~_ik| + eps_k,  S = sum_l L_kl max |z_l|,  W = sum_l L_kl R_l,
+    V + 2 S + 3 W,   V >= max_i |r~_ik| + eps_k,  S = sum_l L_kl max |z_l|,  W = sum_l L_kl R_l,
 with max |z_l| over the domain and the observations, and R_l half the domain's width, which bounds sum_j |G_lj| + s_l.
+V is a power of two, so that bounds do not depend on which index holds an observation, but on what is known alone.
 (W counts three times because (w_s - w_0) + w_0 is computed in place of w_s.) In a row with a columns no leaf passes
 more than a + 24 roundings, because sums over generators run in eight lanes. With u = 2^-53 the error is below
     E_k = 2 (a + 24) u (V + 2 S + 3 W) + one smallest double for each product that may underflow,
@@ -18,6 +19,7 @@ the bounds.
 Work. Any subset of the observations gives a sound envelope, so a search may stop early. */
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -38,9 +40,6 @@ struct EnvelopeOptions {
   int max_leaf_visits = 512;
   /** Up to this many blocks, a query scans all of them and skips the tree. */
   int max_flat_blocks = 16;
-  /** E_k holds for observations with |r~_ik| + eps_k up to this many times the largest one given, >= 1. Choose more
-  than 1 if an EnvelopeTail will be added. */
-  double value_headroom = 1;
   InstructionSet instructions = BestInstructionSet();  ///< Changes the time a query takes, never a bit of its result.
 };
 
@@ -53,7 +52,7 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   static constexpr int kMaxExactColumns = 12;
 
   /** @param domain_lower, domain_upper d_z entries each: a box that contains the hull of every query.
-  @tparam Rows Observations or ObservationRows, which are read by number.
+  @tparam Rows Observations or LastRows, which are read by number.
   @pre declaration.Validate passed and observations is not empty. Cost: ObservationIndex, for each row with columns. */
   template <class Rows>
   LipschitzEnvelope(const Declaration& declaration, const Rows& observations, std::span<const double> domain_lower,
@@ -71,14 +70,18 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   @pre the tail was made for this envelope, and count <= tail.size() as read in this thread. */
   void Enclose(const QuerySet& set, const EnvelopeTail& tail, int count, ResidualBounds& bounds) const noexcept;
 
+  /** Makes E_k hold for further observations, if |r~_ik| + eps_k <= values[k], n entries. Cost O(n). A copy shares the
+  indexes. */
+  void RaiseLimits(std::span<const double> values);
+
   [[nodiscard]] int num_states() const { return static_cast<int>(rows_.size()); }
   [[nodiscard]] const LipschitzRow& row(int k) const { return rows_[ToSize(k)].distance; }
   /** Has no entries if row k is constant. */
-  [[nodiscard]] const ObservationIndex& index(int k) const { return rows_[ToSize(k)].index; }
+  [[nodiscard]] const ObservationIndex& index(int k) const { return *rows_[ToSize(k)].index; }
   /** The highest floor and the lowest ceiling of coordinate k over all observations. */
   [[nodiscard]] double highest_floor(int k) const { return rows_[ToSize(k)].floor; }
   [[nodiscard]] double lowest_ceiling(int k) const { return -rows_[ToSize(k)].negated_ceiling; }
-  /** The largest |floor| and |ceiling| for which E_k holds. */
+  /** V: the largest |floor| and |ceiling| for which E_k holds. */
   [[nodiscard]] double value_limit(int k) const { return rows_[ToSize(k)].value_limit; }
   /** PairMarginUpper for pairs of observations within value_limit and the domain, in a row with columns. */
   [[nodiscard]] double pair_margin(int k) const { return rows_[ToSize(k)].pair_margin; }
@@ -89,10 +92,11 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   // A coordinate of the residual.
   struct Row {
     LipschitzRow distance;
-    ObservationIndex index{};               // none where the row is constant:
-    double floor = 0, negated_ceiling = 0;  // then these are its bounds
-    double error = 0;                       // E_k
-    double value_limit = 0;                 // V
+    std::shared_ptr<const ObservationIndex> index =
+        std::make_shared<const ObservationIndex>();     // where constant, empty:
+    double floor = 0, negated_ceiling = 0;              // then these are the row's bounds
+    double value_limit = 0, locations = 0, widths = 0;  // V, S, W
+    double error = 0;                                   // E_k
     double pair_margin = 0;
     std::vector<double> component_errors{};  // of each column: of v_il and of L_kl r_l
   };
@@ -100,8 +104,9 @@ class LipschitzEnvelope final : public ResidualEnclosure {
 
   void EncloseAll(const QuerySet& set, const EnvelopeTail* tail, int count, ResidualBounds& bounds) const noexcept;
   template <class Rows>
-  void BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Rows& observations,
-                   std::span<const double> domain_lower, std::span<const double> domain_upper) const;
+  static void Measure(Row& row, const Rows& observations, std::span<const double> domain_lower,
+                      std::span<const double> domain_upper);
+  void RaiseLimit(int k, double value);
 
   EnvelopeOptions options_;
   std::vector<Row> rows_;

@@ -212,6 +212,6 @@ ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& 
 }
 
 template ObservationIndex::Entries EntriesOf(const LipschitzRow&, const Declaration&, const Observations&, int);
-template ObservationIndex::Entries EntriesOf(const LipschitzRow&, const Declaration&, const ObservationRows&, int);
+template ObservationIndex::Entries EntriesOf(const LipschitzRow&, const Declaration&, const LastRows&, int);
 
 }  // namespace forereach

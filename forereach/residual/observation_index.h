@@ -97,7 +97,7 @@ class ObservationIndex final {
 
 /** The entries of coordinate k = `coordinate`: floors r~_ik - eps_k and ceilings r~_ik + eps_k, rounded outward, with
 eps_k = Declaration::ObservationError, and their coordinates in plain arithmetic.
-@tparam Rows Observations or ObservationRows. */
+@tparam Rows Observations or LastRows. */
 template <class Rows>
 [[nodiscard]] ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
                                                   const Rows& observations, int coordinate);

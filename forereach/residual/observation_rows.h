@@ -69,4 +69,16 @@ class ObservationRows final {
   GrowingRows rows_;  // z, lower, upper, id
 };
 
+/** The rows from `first` on, as a table of their own. */
+struct LastRows {
+  const ObservationRows& rows;
+  int first;
+
+  [[nodiscard]] int size() const { return rows.size() - first; }
+  [[nodiscard]] int num_states() const { return rows.num_states(); }
+  [[nodiscard]] double z(int i, int l) const { return rows.z(first + i, l); }
+  [[nodiscard]] double lower(int i, int k) const { return rows.lower(first + i, k); }
+  [[nodiscard]] double upper(int i, int k) const { return rows.upper(first + i, k); }
+};
+
 }  // namespace forereach

@@ -17,22 +17,26 @@ struct ObservationStore::Entry {
   std::span<const double> z, lower, upper;
 };
 
-// An index and its tail. Entries of the tail below its size do not change any more, and neither does the index.
+// An index of the rows from the end of the piece before it on.
+struct ObservationStore::Piece {
+  std::shared_ptr<const LipschitzEnvelope> envelope;
+  int end;
+};
+
+// The pieces, the first of which has the first rows, and a tail. Entries of the tail below its size do not change any
+// more, and neither do pieces. Their limits are the same.
 struct ObservationStore::Generation {
-  ObservationRows rows;  // those of the index, and behind them those of the tail
-  int indexed;
-  LipschitzEnvelope envelope;
+  ObservationRows rows;  // those of the pieces, and behind them those of the tail
+  std::vector<Piece> pieces;
   EnvelopeTail tail;
 
-  Generation(const Declaration& declaration, ObservationRows known, std::span<const double> lower,
-             std::span<const double> upper, const StoreOptions& options)
-      : rows(std::move(known)),
-        indexed(rows.size()),
-        envelope(declaration, rows, lower, upper, options.envelope),
-        tail(declaration, envelope, options.tail_capacity) {
-    rows.Reserve(options.tail_capacity);
+  Generation(const Declaration& declaration, ObservationRows known, std::vector<Piece> of_known, int tail_capacity)
+      : rows(std::move(known)), pieces(std::move(of_known)), tail(declaration, first(), tail_capacity) {
+    rows.Reserve(tail_capacity);
   }
 
+  [[nodiscard]] const LipschitzEnvelope& first() const { return *pieces.front().envelope; }
+  [[nodiscard]] int indexed() const { return pieces.back().end; }
   [[nodiscard]] bool HasRoom() const { return tail.size() < tail.capacity(); }
 
   void Append(int id, const Entry& entry) {
@@ -42,10 +46,19 @@ struct ObservationStore::Generation {
 };
 
 void ObservationStore::Snapshot::Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept {
-  generation_->envelope.Enclose(query, generation_->tail, tail_size_, bounds);
+  generation_->first().Enclose(query, generation_->tail, tail_size_, bounds);
+  for (const Piece& piece : std::span(generation_->pieces).subspan(1)) {
+    ResidualBounds others;
+    piece.envelope->Enclose(query, others);
+    for (std::size_t k = 0; k < ToSize(piece.envelope->num_states()); ++k) {
+      bounds.lower[k] = std::max(bounds.lower[k], others.lower[k]);
+      bounds.upper[k] = std::min(bounds.upper[k], others.upper[k]);
+    }
+    bounds.capped |= others.capped;
+  }
 }
 
-std::size_t ObservationStore::Snapshot::size() const { return ToSize(generation_->indexed + tail_size_); }
+std::size_t ObservationStore::Snapshot::size() const { return ToSize(generation_->indexed() + tail_size_); }
 
 std::vector<int> ObservationStore::Snapshot::ids() const {
   std::vector<int> ids(size());
@@ -54,7 +67,7 @@ std::vector<int> ObservationStore::Snapshot::ids() const {
   return ids;
 }
 
-bool ObservationStore::Snapshot::uses_hull_distance() const { return generation_->envelope.uses_hull_distance(); }
+bool ObservationStore::Snapshot::uses_hull_distance() const { return generation_->first().uses_hull_distance(); }
 
 ObservationStore::ObservationStore(Declaration declaration, const Observations& observations,
                                    std::span<const double> domain_lower, std::span<const double> domain_upper,
@@ -62,7 +75,8 @@ ObservationStore::ObservationStore(Declaration declaration, const Observations& 
     : declaration_(std::move(declaration)),
       domain_lower_(domain_lower.begin(), domain_lower.end()),
       domain_upper_(domain_upper.begin(), domain_upper.end()),
-      options_(options) {
+      options_(options),
+      limits_(ToSize(observations.num_states())) {
   declaration_.Validate(observations.num_states(), static_cast<int>(observations.z.cols()));
   if (observations.size() == 0) throw std::invalid_argument("observation store: none given, at least one is needed");
   if (options.tail_capacity < 1 || options.tail_capacity > EnvelopeTail::kMaxCapacity)
@@ -70,7 +84,6 @@ ObservationStore::ObservationStore(Declaration declaration, const Observations& 
                                 " is outside [1, " + std::to_string(EnvelopeTail::kMaxCapacity) + "]");
   if (options.max_observations < 1)
     throw std::invalid_argument("observation store: max_observations must be at least 1");
-  options_.envelope.value_headroom = kValueHeadroom;
   next_id_ = observations.size();
   ObservationRows rows(static_cast<int>(observations.z.cols()), observations.num_states());
   const auto entries = [](const Eigen::RowVectorXd& row) { return std::vector<double>(row.begin(), row.end()); };
@@ -81,7 +94,8 @@ ObservationStore::ObservationStore(Declaration declaration, const Observations& 
   const bool keeps_all = ToSize(next_id_) <= options_.max_observations;
   if (!keeps_all) violation_ = FindViolation(declaration_, observations);
   current_ = Build(std::move(rows));
-  if (keeps_all) violation_ = FindViolation(declaration_, observations, &current_->envelope);
+  for (std::size_t k = 0; k < limits_.size(); ++k) limits_[k] = current_->first().value_limit(static_cast<int>(k));
+  if (keeps_all) violation_ = FindViolation(declaration_, observations, &current_->first());
 }
 
 ObservationStore::~ObservationStore() = default;
@@ -105,12 +119,9 @@ int ObservationStore::tail_size() const {
   return current_->tail.size();
 }
 
-void ObservationStore::Swap(std::shared_ptr<Generation> generation) {
-  const std::lock_guard lock(current_lock_);
-  current_.swap(generation);  // the old one is destroyed after the lock is released, unless a snapshot holds it
-}
-
-std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(ObservationRows rows) const {
+// Indexes the rows behind the pieces: in one more of them, or all in one where not all have room.
+std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(ObservationRows rows,
+                                                                      std::vector<Piece> pieces) const {
   // A contradiction must not be forgotten for want of room.
   if (ToSize(rows.size()) > options_.max_observations && !Violated()) {
     std::vector<int> all(ToSize(rows.size()));
@@ -118,11 +129,20 @@ std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(Observatio
     ObservationRows kept = rows.First(0);
     for (const int i : MostUseful(declaration_, rows.Select(all), options_.max_observations)) kept.Append(rows, i);
     rows = std::move(kept);
+    pieces.clear();
   }
-  return std::make_shared<Generation>(declaration_, std::move(rows), domain_lower_, domain_upper_, options_);
+  const LastRows last{rows, pieces.empty() ? 0 : pieces.back().end};
+  const auto index =
+      std::make_shared<LipschitzEnvelope>(declaration_, last, domain_lower_, domain_upper_, options_.envelope);
+  index->RaiseLimits(limits_);
+  pieces.push_back({index, rows.size()});
+  return std::make_shared<Generation>(declaration_, std::move(rows), std::move(pieces), options_.tail_capacity);
 }
 
-void ObservationStore::Compact() {
+void ObservationStore::Compact() { Merge(true); }
+
+void ObservationStore::Merge(bool all) {
+  constexpr int kMuchLarger = 4;  // times
   const std::lock_guard compacting(compacting_);
   std::shared_ptr<Generation> old;
   int merged = 0;
@@ -131,22 +151,48 @@ void ObservationStore::Compact() {
     old = current_;
     merged = old->tail.size();
   }
-  // Built without the lock, so that others may insert. Generations are swapped under compacting_ alone, so `old` stays
+  if (!all && old->HasRoom()) return;
+  // Built without the lock, so that others may insert. Generations are replaced under compacting_ alone, so `old` stays
   // the one that they append to.
-  const ObservationRows& rows = old->rows;
-  std::shared_ptr<Generation> fresh = Build(rows.First(old->indexed + merged));
+  const int end = old->indexed() + merged;
+  std::vector<Piece> pieces = old->pieces;
+  const auto first_of_last = [&] { return pieces.size() > 1 ? std::prev(pieces.end(), 2)->end : 0; };
+  while (!pieces.empty() && (all || pieces.back().end - first_of_last() <= kMuchLarger * (end - pieces.back().end)))
+    pieces.pop_back();
+  const std::shared_ptr<Generation> fresh = Build(old->rows.First(end), std::move(pieces));
   const std::lock_guard writing(writing_);
-  // Entries that were inserted during Build.
-  const int size = old->tail.size();
+  Replace(*old, fresh, merged);
+}
+
+// E_k has to hold for the entry, too.
+void ObservationStore::RaiseLimits(const Entry& entry) {
+  const std::lock_guard compacting(compacting_);
+  const std::lock_guard writing(writing_);
+  for (std::size_t k = 0; k < limits_.size(); ++k)
+    limits_[k] = std::max(limits_[k], AddUp(std::max(std::abs(entry.lower[k]), std::abs(entry.upper[k])),
+                                            declaration_.ObservationError(static_cast<Eigen::Index>(k))));
+  std::vector<Piece> pieces = current_->pieces;
+  for (Piece& piece : pieces) {
+    const auto raised = std::make_shared<LipschitzEnvelope>(*piece.envelope);
+    raised->RaiseLimits(limits_);
+    piece.envelope = raised;
+  }
+  Replace(*current_,
+          std::make_shared<Generation>(declaration_, current_->rows.First(current_->indexed()), pieces,
+                                       options_.tail_capacity),
+          0);
+}
+
+// What was inserted into `old` meanwhile, behind the first `merged` entries of its tail, comes along. @pre both locks.
+void ObservationStore::Replace(const Generation& old, std::shared_ptr<Generation> fresh, int merged) {
+  const ObservationRows& rows = old.rows;
+  const int size = old.tail.size();
   for (int i = merged; i < size; ++i) {
-    const int row = old->indexed + i;
-    if (!fresh->tail.Covers(rows.lower(row), rows.upper(row))) {  // rare enough to wait for
-      fresh = Build(rows.First(rows.size()));
-      break;
-    }
+    const int row = old.indexed() + i;
     fresh->Append(rows.id(row), {rows.z(row), rows.lower(row), rows.upper(row)});
   }
-  Swap(std::move(fresh));
+  const std::lock_guard lock(current_lock_);
+  current_.swap(fresh);  // the old one is destroyed after the lock is released, unless a snapshot holds it
 }
 
 // One new observation against those of a generation.
@@ -156,8 +202,8 @@ class ObservationStore::PartnerSearch {
       : store_(store), generation_(*store.current_), entry_(entry), id_(id), is_consistent_(!store.Violated()) {}
 
   std::optional<Violation> FindPartner() {
-    for (int k = 0; k < generation_.envelope.num_states(); ++k)
-      if ((generation_.envelope.row(k).is_constant() ? TestConstant(k) : TestRow(k)) && found_) return found_;
+    for (int k = 0; k < generation_.first().num_states(); ++k)
+      if ((Row(k).is_constant() ? TestConstant(k) : TestRow(k)) && found_) return found_;
     return std::nullopt;
   }
 
@@ -168,23 +214,29 @@ class ObservationStore::PartnerSearch {
   bool TestConstant(int k) {
     const Point point = PointIn(k);
     const int size = generation_.tail.size();
-    const double highest = std::max(generation_.envelope.highest_floor(k), generation_.tail.HighestFloor(k, size));
-    const double lowest =
-        std::min(generation_.envelope.lowest_ceiling(k), -generation_.tail.HighestNegatedCeiling(k, size));
+    double highest = generation_.tail.HighestFloor(k, size);
+    double lowest = -generation_.tail.HighestNegatedCeiling(k, size);
+    for (const Piece& piece : generation_.pieces) {
+      highest = std::max(highest, piece.envelope->highest_floor(k));
+      lowest = std::min(lowest, piece.envelope->lowest_ceiling(k));
+    }
     const bool open = NextUp(point.floor) > NextDown(lowest) || NextUp(highest) > NextDown(-point.negated_ceiling);
     return open && TestAll(k);
   }
 
-  // The index by its tree, the tail block by block.
+  // Pieces by their trees, the tail block by block.
   bool TestRow(int k) {
-    const double margin = generation_.envelope.pair_margin(k);
-    if (!std::isfinite(margin) || !generation_.tail.Covers(entry_.lower, entry_.upper)) return TestAll(k);
+    const double margin = generation_.first().pair_margin(k);
+    if (!std::isfinite(margin)) return TestAll(k);
     const Point point = PointIn(k);
-    const PairSearch search(generation_.envelope.index(k), margin, store_.options_.envelope.instructions);
-    if (search.AnyPartner(point, [&](std::uint32_t j) { return Test(static_cast<int>(j), k); })) return true;
+    int first = 0;
+    for (const Piece& piece : generation_.pieces) {
+      const PairSearch search(piece.envelope->index(k), margin, store_.options_.envelope.instructions);
+      if (search.AnyPartner(point, [&](std::uint32_t j) { return Test(first + static_cast<int>(j), k); })) return true;
+      first = piece.end;
+    }
     std::vector<std::uint32_t> partners;
-    PairSearch::Suspects(point, generation_.envelope.row(k), generation_.tail.blocks(k),
-                         ToSize(generation_.tail.size()), margin, partners);
+    PairSearch::Suspects(point, Row(k), generation_.tail.blocks(k), ToSize(generation_.tail.size()), margin, partners);
     return std::ranges::any_of(partners, [&](std::uint32_t j) { return TestInTail(static_cast<int>(j), k); });
   }
 
@@ -194,7 +246,7 @@ class ObservationStore::PartnerSearch {
     return false;
   }
 
-  bool TestInTail(int j, int k) { return Test(generation_.indexed + j, k); }
+  bool TestInTail(int j, int k) { return Test(generation_.indexed() + j, k); }
 
   bool Test(int row, int k) {
     const ObservationRows& rows = generation_.rows;
@@ -215,16 +267,18 @@ class ObservationStore::PartnerSearch {
   // row, and a residual that contains j's.
   [[nodiscard]] bool IsWithin(const ObservationRows& o, int j, int k) const {
     return entry_.lower[ToSize(k)] <= o.lower(j, k) && o.upper(j, k) <= entry_.upper[ToSize(k)] &&
-           std::ranges::all_of(generation_.envelope.row(k).columns(), [&](const LipschitzRow::Column& column) {
+           std::ranges::all_of(Row(k).columns(), [&](const LipschitzRow::Column& column) {
              return entry_.z[ToSize(column.variable)] == o.z(j, column.variable);
            });
   }
+
+  [[nodiscard]] const LipschitzRow& Row(int k) const { return generation_.first().row(k); }
 
   using Point = PairSearch::Point;
   [[nodiscard]] Point PointIn(int k) const {
     const auto i = ToSize(k);
     const double error = store_.declaration_.ObservationError(k);
-    const LipschitzRow& row = generation_.envelope.row(k);
+    const LipschitzRow& row = Row(k);
     Point point{std::vector<double>(row.num_coordinates()), SubDown(entry_.lower[i], error),
                 -AddUp(entry_.upper[i], error)};
     row.Map([&](int l) { return entry_.z[ToSize(l)]; }, point.coordinates.data());
@@ -250,21 +304,10 @@ ObservationStore::Insertion ObservationStore::Insert(std::span<const double> z, 
   const Entry entry{z, lower, upper};
   std::unique_lock writing(writing_);
   while (!current_->HasRoom() || !current_->tail.Covers(lower, upper)) {
-    const bool full = !current_->HasRoom();
+    const bool is_full = !current_->HasRoom();
     writing.unlock();  // compacting_ is taken before writing_ everywhere
-    if (full) {
-      Compact();
-      writing.lock();
-      continue;
-    }
-    const std::lock_guard compacting(compacting_);
-    const std::lock_guard again(writing_);
-    // Too large for the error bound of the index: into a new one at once.
-    const Insertion insertion = Enlist(entry);
-    ObservationRows all = current_->rows.First(current_->rows.size());
-    all.Append(insertion.id, z, lower, upper);
-    Swap(Build(std::move(all)));
-    return insertion;
+    is_full ? Merge(false) : RaiseLimits(entry);
+    writing.lock();
   }
   const Insertion insertion = Enlist(entry);
   current_->Append(insertion.id, entry);

@@ -1,9 +1,11 @@
 /** A set of observations that can grow while other threads query it.
 
 One thread at a time inserts and compacts. Any number of threads take snapshots and query them, and no query waits for
-the construction of an index. New observations are appended to a tail, which queries scan completely; Compact builds a
-new index of index and tail and replaces the old one. A snapshot contains the observations at its creation: it stays
-valid, and gives the same answers, as long as it exists.
+the construction of an index. New observations are appended to a tail, which queries scan completely. A full tail
+becomes an index, together with the last indexes that are not much larger: N observations lie in O(log N) indexes, and
+each was indexed O(log N) times. Compact makes one index of all, for the fastest queries. A snapshot contains the
+observations at its creation: it stays valid, and gives the same answers, as long as it exists. Answers depend on the
+observations alone, not on their indexes, unless a search is capped or observations were dropped.
 
 Every set of observations gives a sound envelope, so nothing here can make a bound wrong: not the tail's limit, not the
 budget, not a removal. */
@@ -28,19 +30,17 @@ struct StoreOptions {
   /** Observations an index may hold, at least 1: memory is 8 (d_z + 2 n + 1) bytes for each, and what ObservationIndex
   states, twice while one is built. When Compact finds more, it keeps those that attain the envelope, MostUseful. */
   std::size_t max_observations = 10'000'000;
-  EnvelopeOptions envelope;  ///< value_headroom is set by the store.
+  EnvelopeOptions envelope;
 };
 
 class ObservationStore final {
  private:
   struct Entry;
+  struct Piece;
   struct Generation;
   class PartnerSearch;
 
  public:
-  /** EnvelopeOptions::value_headroom: a learned residual beyond this times the largest known costs a new index. */
-  static constexpr double kValueHeadroom = 2;
-
   class Snapshot final : public ResidualEnclosure {
    public:
     void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
@@ -74,27 +74,30 @@ class ObservationStore final {
         violation;  ///< The first found with an earlier observation, if any; it is added all the same.
   };
   /** Adds one observed transition, d_z and n entries, and tests it against all others: about a microsecond. When the
-  tail is full it compacts first, which takes as long as building an index. */
+  tail is full it builds an index first: of O(log N) observations for each one inserted, all told. */
   Insertion Insert(std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
 
-  /** Puts the tail into the index and keeps to the budget. May run beside Insert, in a thread of its own. */
+  /** Puts indexes and tail into one index and keeps to the budget. May run beside Insert, in a thread of its own. */
   void Compact();
 
   /** How full the tail is, so that a thread that has the time can compact before it must. */
   [[nodiscard]] int tail_size() const;
 
  private:
-  std::shared_ptr<Generation> Build(ObservationRows rows) const;
+  std::shared_ptr<Generation> Build(ObservationRows rows, std::vector<Piece> pieces = {}) const;
+  void Merge(bool all);
+  void RaiseLimits(const Entry& entry);
+  void Replace(const Generation& old, std::shared_ptr<Generation> fresh, int merged);
   Insertion Enlist(const Entry& entry);
   bool Violated() const;
-  void Swap(std::shared_ptr<Generation> generation);
 
   const Declaration declaration_;
   const std::vector<double> domain_lower_, domain_upper_;
   StoreOptions options_;
 
-  std::mutex compacting_;  // one at a time; taken before the others
-  std::mutex writing_;     // the tail's end, next_id_; taken before current_lock_
+  std::mutex compacting_;       // one at a time; taken before the others
+  std::vector<double> limits_;  // of every index, LipschitzEnvelope::RaiseLimits
+  std::mutex writing_;          // the tail's end, next_id_; taken before current_lock_
   int next_id_ = 0;
   mutable std::mutex current_lock_;  // the two below, to copy or set them
   std::shared_ptr<Generation> current_;

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "forereach/residual/observation_store.h"
+#include "forereach/residual/lipschitz_envelope.h"
 #include "forereach/residual/observations.h"
 #include "research/methods/samples.h"
 
@@ -32,8 +32,7 @@ class Scaled final : public ResidualEnclosure {
 std::unique_ptr<ResidualEnclosure> MakeForeReach(const Setting& setting, const Declaration& declaration) {
   const auto [lower, upper] = setting.domain.Corners();
   declaration.Validate(setting.model.num_states(), setting.model.num_variables());
-  return std::make_unique<LipschitzEnvelope>(declaration, Observe(setting.model, setting.data), lower, upper,
-                                             EnvelopeOptions{.value_headroom = ObservationStore::kValueHeadroom});
+  return std::make_unique<LipschitzEnvelope>(declaration, Observe(setting.model, setting.data), lower, upper);
 }
 
 std::unique_ptr<ResidualEnclosure> MakeForeReach(const Setting& setting) {
