@@ -39,17 +39,27 @@ struct PageRead : PagePass {
 // Forgets what the page has no room for.
 void KeepLast(const std::vector<std::unique_ptr<PageRead>>& read, const PageBounds& bounds) {
   std::vector<PagePass*> passes;
-  std::vector<std::int64_t> times;
-  for (const auto& each : read) {
-    passes.push_back(each.get());
-    if (each)
-      for (const RecordedAbstention& abstention : each->abstentions.all()) times.push_back(abstention.decision.utime);
-  }
+  for (const auto& each : read) passes.push_back(each.get());
   KeepLast(passes, bounds);
-  const std::int64_t begin = BeginOfLast(std::move(times), kMostAdvised);
-  for (const auto& each : read)
-    if (each)
-      std::erase_if(each->abstentions.all(), [&](const auto& abstention) { return abstention.decision.utime < begin; });
+  std::vector<std::int64_t> times;
+  std::vector<DatedSet> sets;
+  for (const auto& each : read) {
+    if (!each) continue;
+    for (const auto& [place, entry] : each->cases.entries())
+      sets.emplace_back(entry.recorded.decision.utime, entry.recorded.basis.obstacles);
+    for (const RecordedAbstention& abstention : each->abstentions.all()) {
+      times.push_back(abstention.decision.utime);
+      sets.emplace_back(times.back(), abstention.basis.obstacles);
+    }
+  }
+  const std::int64_t kept = BeginOfKept(std::move(sets)),
+                     begin = std::max(kept, BeginOfLast(std::move(times), kMostAdvised));
+  for (const auto& each : read) {
+    if (!each) continue;
+    std::erase_if(each->cases.entries(),
+                  [&](const auto& entry) { return entry.second.recorded.decision.utime < kept; });
+    std::erase_if(each->abstentions.all(), [&](const auto& abstention) { return abstention.decision.utime < begin; });
+  }
 }
 
 // The advice on the last decisions that are no certificates. Without a log or its task, there is none.

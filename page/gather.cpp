@@ -321,6 +321,16 @@ std::int64_t BeginOfLast(std::vector<std::int64_t> times, std::size_t most) {
   return *first;
 }
 
+std::int64_t BeginOfKept(std::vector<DatedSet> sets, std::size_t most) {
+  std::ranges::sort(sets, std::ranges::greater{}, &DatedSet::first);
+  KeptObstacles kept(most);
+  for (const auto& [time, set] : sets) {
+    kept.Add(*set);
+    if (kept.AreTooMany()) return time + 1;
+  }
+  return std::numeric_limits<std::int64_t>::min();
+}
+
 namespace {
 
 // Erases all that is older than the last `most` of all runs. @param of what a pass has, and a time of it.

@@ -7,6 +7,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "page/page_data.h"
@@ -104,6 +105,12 @@ void AddDetails(PageRun& page, PageRun&& details, std::size_t& bytes);
 
 /** When the last `most` of these times begin; the least number if there are no more. */
 [[nodiscard]] std::int64_t BeginOfLast(std::vector<std::int64_t> times, std::size_t most);
+
+/** A set of obstacles and the time of the decision under it. */
+using DatedSet = std::pair<std::int64_t, std::shared_ptr<const std::vector<Obstacle>>>;
+/** When the last of these sets begin that have room together, as KeptObstacles counts them; the least number if all
+have. Cost O(n log n), and the obstacles of each set once. */
+[[nodiscard]] std::int64_t BeginOfKept(std::vector<DatedSet> sets, std::size_t most = KeptObstacles::kMost);
 
 /** Notes what could not be read. */
 void AddMissing(PageRun& page, const NamedRuns& named);

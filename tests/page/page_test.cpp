@@ -210,6 +210,20 @@ PageDetail DetailOfStandingCar(const Config& task, const std::vector<Obstacle>& 
   return detail;
 }
 
+TEST(GatherTest, OfSeveralRunsTheLastSetsOfObstaclesThatHaveRoomAreKept) {
+  const auto set = [](int size) {
+    return std::make_shared<const std::vector<Obstacle>>(static_cast<std::size_t>(size),
+                                                         Obstacle::Circle(Eigen::Vector2d(0, 0), 1));
+  };
+  const auto shared = set(4);
+  const std::vector<DatedSet> sets{{30, set(2)}, {10, shared}, {40, set(3)}, {20, shared}, {50, set(0)}};
+  constexpr auto kAll = std::numeric_limits<std::int64_t>::min();
+  // What the oldest one kept has does not count.
+  for (const auto& [most, begin] : {std::pair<std::size_t, std::int64_t>{5, kAll}, {4, 21}, {3, 21}, {2, 31}, {0, 31}})
+    EXPECT_EQ(BeginOfKept(sets, most), begin) << most;
+  EXPECT_EQ(BeginOfKept({}, 0), kAll);
+}
+
 TEST(DetailTest, ABodyIsDrawnAtEachStep) {
   const PageDetail detail = DetailOfStandingCar(LoadConfig(FOREREACH_SOURCE_DIR "/config/demo.yaml"));
   ASSERT_EQ(detail.missing, "");
