@@ -6,6 +6,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "certifier/gate/obstacle_sender.h"
+#include "certifier/gate/obstacles_in_force.h"
+#include "lcmtypes/seal.h"
 #include "live/watcher.h"
 #include "tests/records/course.h"
 
@@ -19,6 +22,41 @@ inline std::vector<LogEvent> CourseEvents() {
   ForEachEvent({kCourseLog}, [&](const LogEvent& event, const std::string&) { events.push_back(event); });
   return events;
 }
+
+/** Sends a watcher decisions of the course, each under another set of so many obstacles. */
+class Crowd {
+ public:
+  Crowd(Watcher& watcher, std::size_t size) : watcher_(watcher), size_(size) {
+    for (const LogEvent& event : CourseEvents())
+      if (const auto decision = Decoded<decision_t>(event.message())) decision_ = *decision, now_ = event.utime;
+  }
+
+  void Decide() {
+    sender_.Set(std::vector(size_, Obstacle::Circle(Eigen::Vector2d(x_++, 90), 1)));
+    do {
+      const auto message = Encode(*sender_.Due(now_ += ObstacleSender::kBurstUs));
+      EXPECT_EQ(in_force_.Update(message, now_), "");
+      Send("OBSTACLES", message);
+    } while (in_force_.is_partial());
+    ++decision_.sequence;
+    SetDigest(decision_.obstacles_digest, in_force_.digest());
+    Send("PLAN_DECISION", Encode(decision_));
+  }
+
+ private:
+  void Send(const std::string& channel, std::vector<std::uint8_t> bytes) {
+    watcher_.Take({0, now_, channel, std::move(bytes)});
+  }
+
+  Watcher& watcher_;
+  const std::size_t size_;
+  decision_t decision_{};  // of the course, the last one
+  std::int64_t now_ = 0;
+  double x_ = 0;
+  const Config task_ = CourseTask();
+  ObstaclesInForce in_force_{task_};
+  ObstacleSender sender_{ObstacleSender::PeriodUs(task_.gate)};
+};
 
 /** Collects all that a watcher tells. */
 struct Reader {

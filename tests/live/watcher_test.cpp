@@ -238,6 +238,19 @@ TEST(WatcherTest, AFloodIsBounded) {
   EXPECT_GT(reader.now.at("counts").at("not_shown"), 15'000);
 }
 
+TEST(WatcherTest, OfLargeSetsATickKeepsAsManyAsHaveRoom) {
+  Watcher watcher(CourseTask(), {}, CourseTask);
+  Crowd crowd(watcher, 512);
+  const std::size_t each = 512 + CourseTask().obstacles.size(), room = (1 << 16) / each + 1;  // and the last one
+  Reader reader;
+  for (const std::size_t more : {std::size_t{0}, std::size_t{10}}) {
+    for (std::size_t i = 0; i < room + more; ++i) crowd.Decide();
+    watcher.Tick(1);
+    reader.Read(watcher);
+    EXPECT_EQ(reader.now.at("counts").at("not_shown"), more);
+  }
+}
+
 TEST(WatcherTest, ShowsARepeatedFaultOrWithdrawalOnce) {
   Watcher watcher(CourseTask(), {}, CourseTask);
   for (int i = 0; i < 5; ++i) {
