@@ -9,7 +9,7 @@ whose leaves are r~_ik -+ eps_k (rounded outward once, then taken as exact), L_k
 s_l. Over all queries their magnitudes add up to at most
     V + 2 S + 3 W,   V >= max_i |r~_ik| + eps_k,  S = sum_l L_kl max |z_l|,  W = sum_l L_kl R_l,
 with max |z_l| over the domain and the observations, and R_l half the domain's width, which bounds sum_j |G_lj| + s_l.
-V is a power of two, so that bounds do not depend on which index holds an observation, but on what is known alone.
+V is a power of two, so that few observations raise it (RaiseLimits): all indexes of a store have the same one.
 (W counts three times because (w_s - w_0) + w_0 is computed in place of w_s.) In a row with a columns no leaf passes
 more than a + 24 roundings, because sums over generators run in eight lanes. With u = 2^-53 the error is below
     E_k = 2 (a + 24) u (V + 2 S + 3 W) + one smallest double for each product that may underflow,
