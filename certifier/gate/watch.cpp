@@ -8,6 +8,7 @@
 
 #include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
+#include "lcmtypes/freshness.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
