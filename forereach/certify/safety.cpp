@@ -511,7 +511,7 @@ class SafetyTest::Judgement {
     if (has_boxes()) EncloseBodies();
     if (!has_boxes() || index.has_moving() || !index.everywhere().empty()) EncloseHulls();
     BuildTree(first_, units_);
-    if (has_boxes()) SeeNearest(index);
+    if (has_sides_) SeeNearest(index);
     SeeNear(index, first_, units_);
     if (index.has_moving()) SeeMoving(index);
     if (!index.everywhere().empty()) SeeEverywhere(index);
