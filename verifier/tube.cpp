@@ -930,10 +930,14 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   Slice next = Image(query, step, !recorded && options.reduce, offset, slack);
   const Real half(0.5);
   const Box& domain = problem_.domain.state;
-  for (int k = 0; k < n; ++k) {  // diag(q)
+  for (int k = 0; k < n; ++k) {  // diag(q), of its own or part of what offsets add
     const auto& [lower, upper] = step.remainder[ToSize(k)];
     next.center[ToSize(k)] += half * (lower + upper);
-    if (const Real q = half * (upper - lower); !q.IsZero()) next.columns.push_back(Axis(n, k, q));
+    const Real q = half * (upper - lower);
+    if (problem_.timing.error > 0)
+      offset.spread[ToSize(k)] += q;
+    else if (!q.IsZero())
+      next.columns.push_back(Axis(n, k, q));
   }
   for (int k = 0; k < n; ++k) {  // diag(h + w)
     const auto& [lower, upper] = step.envelope[ToSize(k)];
