@@ -93,7 +93,7 @@ ObservationStore::ObservationStore(Declaration declaration, const Observations& 
   // Where not all are kept, the contradiction has to be known before: Build then keeps all.
   const bool keeps_all = ToSize(next_id_) <= options_.max_observations;
   if (!keeps_all) violation_ = FindViolation(declaration_, observations);
-  current_ = Build(std::move(rows));
+  current_ = Build(std::move(rows), {});
   for (std::size_t k = 0; k < limits_.size(); ++k) limits_[k] = current_->first().value_limit(static_cast<int>(k));
   if (keeps_all) violation_ = FindViolation(declaration_, observations, &current_->first());
 }

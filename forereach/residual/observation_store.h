@@ -84,7 +84,7 @@ class ObservationStore final {
   [[nodiscard]] int tail_size() const;
 
  private:
-  std::shared_ptr<Generation> Build(ObservationRows rows, std::vector<Piece> pieces = {}) const;
+  std::shared_ptr<Generation> Build(ObservationRows rows, std::vector<Piece> pieces) const;
   void Merge(bool all);
   void RaiseLimits(const Entry& entry);
   void Replace(const Generation& old, std::shared_ptr<Generation> fresh, int merged);
