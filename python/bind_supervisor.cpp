@@ -179,8 +179,8 @@ Without a `robot` it returns sooner if the control ends before its step does: ho
            py::arg("state") = py::none(), py::arg("state_error") = py::none(),
            R"(Handles the step boundary that was due at `utime`. ends: no further plan starts.
 
-state: (n,), as measured last, and state_error: (n,), how far it may be off, by default the task's; both without a
-`robot` alone. Returns the control to apply until the next boundary, (m,); None: hold.)")
+state: (n,), as measured last, and state_error: (n,), how far it may be off, by default the task's; both only without a
+`robot`. Returns the control to apply until the next boundary, (m,); None: hold.)")
       .def_property_readonly("control", py::overload_cast<>(&BusSupervisor::Control),
                              "The control under way, until a stop or a withdrawal ends it; None: hold.")
       .def("expect", &BusSupervisor::Expect, py::arg("task"), "After reload(): also accepts plans under this task.")

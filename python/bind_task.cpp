@@ -335,7 +335,8 @@ Any number of threads may use one. n states, m inputs, T steps; the units are th
 
 In the paper's words: Task(equations=..., domain=..., L=..., data=...). equations stands for `model`, with `states`, and L for
 `declaration.lipschitz`: names, or (n, n + m) in the states' units per those of states and inputs. Unless they are given, too,
-`declaration.noise_bound` is zero, and `task` has no obstacle: the data are exact, certificates hold at the samples.
+`declaration.noise_bound` is zero, and `task` has no obstacle: the data are exact, certificates hold at the samples. The task's
+x0 is then the whole domain: give certify its own.
 
 `path` names it in messages, and the files that it names are relative to the directory of `path`.
 data: (z, x_next) of observed steps, (N, n + m) and (N, n), instead of the file `transitions`, or (z, x_next, dt_error):

@@ -6,12 +6,20 @@ import numpy as np
 from . import _forereach
 
 
+def anywhere(domain):
+    """X_0 as large as the domain: nothing is assumed of a start that is not given."""
+    try:
+        lower, upper = (np.array(domain["state"][end], float) for end in ("lower", "upper"))
+        return {"center": lower / 2 + upper / 2, "half_width": upper / 2 - lower / 2}
+    except (KeyError, TypeError, ValueError):  # then the domain is refused where the task is read
+        return {"center": [], "half_width": []}
+
+
 def spelled_out(equations, domain, L, declaration={}, **others):
     """The keys of a task file. What is not said is as in the paper: exact data, no obstacles, certificates at samples."""
     states = list(equations.get("states", [])) if isinstance(equations, dict) else []
-    zeros = [0] * len(states)
-    task = {"initial_set": {"center": zeros, "half_width": zeros}, "projection": states[:2], "between": "samples", "obstacles": []}
-    declaration = dict(lipschitz=L, **{"noise_bound": zeros, **declaration})
+    task = {"initial_set": anywhere(domain), "projection": states[:2], "between": "samples", "obstacles": []}
+    declaration = dict(lipschitz=L, **{"noise_bound": [0] * len(states), **declaration})
     return dict(model=equations, domain=domain, declaration=declaration, **{"task": task, **others})
 
 

@@ -279,6 +279,9 @@ class Tasks(unittest.TestCase):
         self.assertEqual((decision.certified, decision.obstacle, decision.clearance), (True, None, None))
         self.assertIn("no obstacle", decision.message)
         self.assertTrue(decision.plot())
+        unsaid = task.certify(U)
+        self.assertFalse(unsaid.certified)
+        np.testing.assert_allclose(unsaid.tube.hull[0], [[-9, 9], [-3, 3]])
         noisy = fr.Task(L={"v": {"v": 0.02}}, declaration={"noise_bound": [0, 0.01]}, **paper).certify(U, x0)
         self.assertGreater(np.ptp(noisy.tube.hull[1, 1]), np.ptp(expected[1, 1]))
         for missing in ["equations", "domain"]:
@@ -287,6 +290,8 @@ class Tasks(unittest.TestCase):
         self.assertRaisesRegex(TypeError, "model", fr.Task, L=[[0]], model={}, **paper)
         self.assertRaisesRegex(TypeError, "lipschitz", fr.Task, L=[[0]], declaration={"lipschitz": [[0]]}, **paper)
         self.assertRaisesRegex(fr.Error, "model", fr.Task, L=[[0]], **{**paper, "equations": "x"})
+        for domain in ["x", {}, {"state": {"lower": [-9, -3], "upper": [9, 3, 3]}}, {"state": {"lower": "x", "upper": [9, 3]}}]:
+            self.assertRaisesRegex(fr.Error, "domain", fr.Task, L=[[0] * 3] * 2, **{**paper, "domain": domain})
         self.assertRaisesRegex(fr.Error, "transitions: missing", fr.Task, L=[[0] * 3] * 2, **{**paper, "data": None})
         self.assertRaisesRegex(fr.Error, "lipschitz", fr.Task, L=[[0]], **paper)
 
