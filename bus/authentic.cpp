@@ -296,7 +296,7 @@ bool Authenticator::IsDoubted(const GroupTag& tag) const {
 void Authenticator::CountTry(const GroupTag& tag) {
   auto doubt = std::ranges::find(doubts_, tag, &Doubt::tag);
   if (doubt == doubts_.end()) {
-    // The oldest gives its place: a flood of tags forgets doubts, and grows nothing.
+    // It takes the place of the oldest: in a flood of tags doubts are forgotten, and no memory grows.
     doubt = doubts_.begin() + static_cast<std::ptrdiff_t>(next_doubt_++ % doubts_.size());
     *doubt = {tag, 0};
   }

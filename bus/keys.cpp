@@ -293,7 +293,7 @@ bool IsDirectory(const std::string& path) {
 // Checks the open file, so that the checked file is the one that is read.
 KeyFile Load(const std::string& path) {
   RequireSodium(path);
-  // Opening a pipe or a terminal neither waits nor becomes this process's own.
+  // A pipe is opened without waiting, and a terminal does not become this process's own.
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) FailSystem(path, "cannot be read");
@@ -425,7 +425,7 @@ class KeyDirectory final {
   }
 
   void Exchange() const {
-    // In one step: at no time is there a directory with keys of both.
+    // In one step: at no time has a directory keys of the old and the new set.
     if (::renameat2(parent_->get(), other_.c_str(), parent_->get(), name_.c_str(), RENAME_EXCHANGE) != 0)
       FailSystem(path_, "cannot be exchanged for " + other_path() +
                             ", which needs a file system that exchanges directories in one step");

@@ -18,8 +18,8 @@ namespace {
 
 template <class Message>
 void Keep(std::deque<Message>& waiting, const Message& message) {
-  // Whoever never asks does not grow without bound.
   waiting.push_back(message);
+  // For a caller who never asks for them.
   if (waiting.size() > PlannerClient::kMostWaiting) waiting.pop_front();
 }
 

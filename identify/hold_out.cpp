@@ -29,8 +29,7 @@ Observations Joined(const Observations& a, const Observations& b) {
 void Mark(const Declaration& declaration, const Observations& all, int first, int k, std::vector<bool>& contradicts) {
   const LipschitzRow row(declaration, k);
   const auto test = [&](int i, int j) { return TestPair(declaration, all, i, j, k).has_value(); };
-  // Then all pairs count alike, and the two extremes contradict if any does.
-  if (row.is_constant()) {
+  if (row.is_constant()) {  // all pairs count alike, and the two extremes contradict if any does
     int highest = 0, lowest = 0;
     for (int i = 1; i < first; ++i) {
       if (all.lower(i, k) > all.lower(highest, k)) highest = i;

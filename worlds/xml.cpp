@@ -23,7 +23,7 @@ class TreeBuilder {
     XML_SetUserData(parser_.get(), this);
     XML_SetElementHandler(parser_.get(), &TreeBuilder::Begin, &TreeBuilder::End);
     XML_SetCharacterDataHandler(parser_.get(), &TreeBuilder::Characters);
-    // With it entities go, which can name files and grow without end.
+    // What it refuses brings entities, which can name files and grow without end.
     XML_SetStartDoctypeDeclHandler(parser_.get(), &TreeBuilder::Doctype);
   }
 

@@ -28,7 +28,7 @@ double LeastDistanceOfMiddle(const Abstained& abstained, const Tube& tube, const
     return places.At({middle.data(), ToSize(middle.size())});
   };
   double least = kInfinity;
-  // Between two samples the body is somewhere in the hull of both, less what the path may bend.
+  // Between two samples the body is in the hull of both, give or take what the path may bend, which is taken off.
   const int length = problem.between ? 1 : 0, end = tube.length() - length;
   for (int t = first_step; t <= end; ++t) {
     const std::vector<BodyPart> from = at(t), to = at(t + length);

@@ -376,7 +376,7 @@ void PlanLedger::Judge(Gate& gate, std::int64_t now_us, bool is_contradicted) {
     if (!record.force) continue;
     record.force->is_changed |= have_changed;
     if (!record.force->is_changed) continue;
-    // A guard compares what an unknown plan is withdrawn under, the obstacles among it, so they have to be known.
+    // A guard compares the grounds on which an unknown plan is withdrawn, so the obstacles have to be known.
     if (record.is_known || knows_obstacles || has_lost_obstacles)
       Judge(record, gate);
     else
