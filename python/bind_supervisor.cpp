@@ -20,7 +20,7 @@ class PythonRobot final : public RobotClient::Robot {
  public:
   explicit PythonRobot(py::object robot) : robot_(std::move(robot)) {}
 
-  // By its caller, as far as it is None: there is no other way to measure that.
+  // Takes what the caller measured of a robot that is None. Any other measures itself, and two answers could differ.
   void Measured(const py::object& state, const py::object& error, int num_states) {
     if (state.is_none() == robot_.is_none() || (state.is_none() && !error.is_none()))
       throw std::invalid_argument("state: has to be given to boundary if the supervisor has no robot, and only then");
@@ -164,7 +164,8 @@ comes to rest by its own means; and, where it has them, steps_to_rest(lower, upp
 reload(). An exception in one of them stops the robot and goes to sys.unraisablehook. Only the thread that made it may
 use it.
 
-Without a `robot` you give each boundary its state, and come to rest by your own means where `control` is None.)")
+Without a `robot` you give each boundary its state, the first one before you listen, and come to rest by your own means
+where `control` is None.)")
       .def(py::init(
                [](std::shared_ptr<JudgingTask> task, py::object robot, const std::string& key, const std::string& url) {
                  return std::make_unique<BusSupervisor>(task, std::move(robot), key, url);
