@@ -98,7 +98,7 @@ class Drive(BusTest):
 
 
 class Block(BusTest):
-    """The block of Python with which this module was asked for."""
+    """All classes of the module in a few lines."""
     TEXT = """
 task = fr.Task.load("task.yaml")
 fr.Task(equations=equations, domain=domain, L=L, data=data)
