@@ -415,7 +415,11 @@ PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obs
   const Encounter& meeting = unit.MeetIn(obstacle);
   if (!meeting.is_there) return {{kInfinity, 0}, -1};
   const auto separate = [&](const Obstacle& convex) {
-    return unit.Best(unit.ByDirections({unit.ByHulls(convex, meeting), -1}, convex, meeting), convex, meeting);
+    const PartSeparation by_hulls{unit.ByHulls(convex, meeting), -1};
+    const PartSeparation best = unit.Best(unit.ByDirections(by_hulls, convex, meeting), convex, meeting);
+    if (best.separation.IsProven() || meeting.moves || placement_.is_at_frame()) return best;
+    const Separation boxed = SeparateHulls(unit.EncloseBody(), convex);  // what Judgement::ByBox proves is proven here
+    return boxed.IsProven() ? PartSeparation{boxed, -1} : best;
   };
   if (!obstacle.grid()) return separate(obstacle);
   PartSeparation closest{{kInfinity, 0}, -1};

@@ -159,7 +159,7 @@ void StepOffsets::AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotop
     const Lanes growth = LoadLanes(&growths[k]), w = LoadLanes(step.unexpected + k);
     const Lanes off = by_step * reach + AllLanes(4 * kUnitRoundoff) * Abs(column) + LoadLanes(arounds + k);
     Lanes added = ends * (off + LoadLanes(&declared_[k])) + growth * (most + w) + left + remainder;
-    added = added > AllLanes(0) ? added * AllLanes(1 + kOffsetRelative) + AllLanes(kOffsetSmallest) : added;
+    added = added + growth > AllLanes(0) ? added * AllLanes(1 + kOffsetRelative) + AllLanes(kOffsetSmallest) : added;
     StoreLanes(sum + Abs(column), &sums.row[k]);
     StoreLanes(column, &spread.column[k]);
     StoreLanes(LoadLanes(step.disturbance + k) + added, &spread.half_width[k]);

@@ -84,7 +84,8 @@ void LipschitzEnvelope::RaiseLimit(int k, double value) {
 }
 
 void LipschitzEnvelope::RaiseLimits(std::span<const double> values) {
-  for (const int k : std::vector<int>(active_)) RaiseLimit(k, values[ToSize(k)]);
+  for (int k = 0; k < num_states(); ++k)  // those that are not searched any more, too: a tail has to cover their values
+    if (!row(k).is_constant()) RaiseLimit(k, values[ToSize(k)]);
 }
 
 using internal::Budget;

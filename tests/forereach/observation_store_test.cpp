@@ -178,6 +178,22 @@ TEST(ObservationStore, ALargeValueCostsNoIndex) {
   EXPECT_EQ(store.tail_size(), 1);
 }
 
+// Each is larger than all before, and the rounding of none is bounded: the row has no finite bound any more.
+TEST(ObservationStore, TakesValuesBeyondWhichNothingIsBounded) {
+  TracedRandom random(818);
+  ObservationStore store = StoreOf(Observe(random, 20));
+  for (const double value : {0x1.8p959, 0x1.8p960, 0x1p1000, 0x1p1023}) {
+    Sample large = Observe(random);
+    large.lower[1] = large.upper[1] = value;
+    Insert(store, large);
+  }
+  EXPECT_EQ(store.snapshot().size(), 24u);
+  const ResidualBounds bounds = Ask(store.snapshot(), Query(random));
+  EXPECT_EQ(bounds.lower[1], -std::numeric_limits<double>::infinity());
+  EXPECT_EQ(bounds.upper[1], std::numeric_limits<double>::infinity());
+  EXPECT_LT(bounds.upper[0], 1e300);
+}
+
 TEST(ObservationStore, ASnapshotStaysAsItWas) {
   TracedRandom random(801);
   const std::vector<Sample> samples = Observe(random, 20);
