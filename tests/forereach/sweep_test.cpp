@@ -449,9 +449,11 @@ TEST(Body, ItsSidesPointOutward) {
     Placement::Pose pose;
     placement.PoseOver(Zonotope::FromBox(Vec({5, 6, 0.7}), Vec({0, 0, 0})), std::array<double, 3>{}, pose);
     for (int i = 0; i < 4; ++i) {
-      const auto [x, y] = placement.Side(pose, i);
-      EXPECT_NEAR(std::hypot(x, y), 1, 1e-15);
-      const auto along = [&](int j) { return x * pose.middle[0][ToSize(j)] + y * pose.middle[1][ToSize(j)]; };
+      const std::array<double, 2> side = placement.Side(pose, i);
+      EXPECT_NEAR(std::hypot(side[0], side[1]), 1, 1e-15);
+      const auto along = [&](int j) {
+        return side[0] * pose.middle[0][ToSize(j)] + side[1] * pose.middle[1][ToSize(j)];
+      };
       EXPECT_NEAR(along(i), along((i + 1) % 4), 1e-14);
       EXPECT_LT(along((i + 2) % 4), along(i) - 0.5);
     }
