@@ -433,8 +433,9 @@ PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obs
 
 // Interval hulls settle what is far away, and single directions what is near. What they do not prove, and then what
 // they leave as possibly closest, is settled by the best direction. Any of these bounds proves a pair apart
-// (docs/soundness.md, 3.9); the order saves time, and the last pass finds the closest pair for the report. The result
-// does not depend on the order in which pairs are seen, so an index changes nothing.
+// (docs/soundness.md, 3.9); the order saves time, and the last pass finds the closest pair for the report. The outcome
+// does not depend on the order in which pairs are seen; of pairs as close as searches are exact an index may tell
+// others.
 class SafetyTest::Judgement {
  public:
   Judgement(const SafetyTest& test, const ObstacleView& obstacles, const Schedule& schedule, Tube& tube, int first,
