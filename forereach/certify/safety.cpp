@@ -233,6 +233,13 @@ class SafetyTest::Unit {
     return hull;
   }
 
+  // A box around the body, as EncloseBody's, is tighter than a ball around it, but says nothing new of a ball, nor of
+  // what moves.
+  template <class Body>
+  [[nodiscard]] Separation ByBox(const Obstacle& obstacle, const Body& body) const noexcept {
+    return placement().is_at_frame() || obstacle.motion() ? Separation{} : SeparateHulls(body(), obstacle);
+  }
+
   // By one direction for each part, from its middle to the obstacle, or as given if that is better.
   [[nodiscard]] PartSeparation ByDirections(const PartSeparation& by_hulls, const Obstacle& obstacle,
                                             const Encounter& meeting) noexcept {
@@ -417,8 +424,8 @@ PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obs
   const auto separate = [&](const Obstacle& convex) {
     const PartSeparation by_hulls{unit.ByHulls(convex, meeting), -1};
     const PartSeparation best = unit.Best(unit.ByDirections(by_hulls, convex, meeting), convex, meeting);
-    if (best.separation.IsProven() || meeting.moves || placement_.is_at_frame()) return best;
-    const Separation boxed = SeparateHulls(unit.EncloseBody(), convex);  // what Judgement::ByBox proves is proven here
+    if (best.separation.IsProven()) return best;
+    const Separation boxed = unit.ByBox(convex, [&] { return unit.EncloseBody(); });  // as a judgement
     return boxed.IsProven() ? PartSeparation{boxed, -1} : best;
   };
   if (!obstacle.grid()) return separate(obstacle);
@@ -868,11 +875,11 @@ class SafetyTest::Judgement {
     touch_ = best;
   }
 
-  // A box around the body is tighter than a ball around it, but says nothing new of a ball, nor of what moves.
   [[nodiscard]] Separation ByBox(int t, int o) noexcept {
-    if (is_at_frame() || obstacle(o).motion()) return {};
-    EncloseBody(t);
-    return SeparateHulls(tight_bodies_[ToSize(t - first_)], obstacle(o));
+    return unit_.ByBox(obstacle(o), [&]() -> const Hull& {
+      EncloseBody(t);
+      return tight_bodies_[ToSize(t - first_)];
+    });
   }
   void EncloseBody(int t) noexcept {
     const std::size_t i = ToSize(t - first_);
