@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/certify/way_clear.h"
 #include "forereach/numerics/least.h"
 #include "forereach/numerics/size.h"

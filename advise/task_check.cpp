@@ -17,6 +17,7 @@
 #include "forereach/certify/explain.h"
 #include "forereach/certify/learned.h"
 #include "forereach/certify/rates.h"
+#include "forereach/certify/tube.h"
 #include "forereach/declare/flow.h"
 #include "forereach/dynamics/unbounded.h"
 #include "forereach/numerics/limits.h"

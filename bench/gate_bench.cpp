@@ -7,6 +7,7 @@
 #include "bench/candidates.h"
 #include "bus/authentic.h"
 #include "certifier/gate/gate.h"
+#include "forereach/certify/tube.h"
 #include "lcmtypes/seal.h"
 
 namespace forereach::bench {

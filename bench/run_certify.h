@@ -7,6 +7,7 @@
 
 #include "bench/tasks.h"
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 
 namespace forereach::bench {
 

@@ -12,6 +12,7 @@
 
 #include "bench/tasks.h"
 #include "forereach/certify/extender.h"
+#include "forereach/certify/tube.h"
 #include "forereach/reach/propagator.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/lipschitz_envelope.h"

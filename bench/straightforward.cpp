@@ -1,4 +1,5 @@
 #include "bench/straightforward.h"
+#include "forereach/certify/tube.h"
 
 #include <algorithm>
 #include <cmath>

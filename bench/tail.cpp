@@ -7,6 +7,7 @@
 #include "bench/latencies.h"
 #include "bench/tasks.h"
 #include "command_line/command_line.h"
+#include "forereach/certify/tube.h"
 
 namespace forereach::bench {
 namespace {

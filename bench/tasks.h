@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "forereach/certify/certifier.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach::bench {
 

@@ -16,6 +16,7 @@
 #include "command_line/progress.h"
 #include "forereach/certify/explain.h"
 #include "forereach/certify/extremal.h"
+#include "forereach/certify/tube.h"
 #include "forereach/numerics/parallel.h"
 #include "forereach/numerics/text.h"
 #include "forereach/safety/clearance.h"

@@ -7,6 +7,7 @@
 
 #include "cli/commands.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/numerics/text.h"
 #include "forereach/safety/obstacle_index.h"
 #include "records/decision_json.h"

@@ -19,7 +19,8 @@ function(forereach_compile_together)
 endfunction()
 
 # Files with compile options or definitions of their own, generated ones, and those that differ from the last commit stay
-# alone: who works on a file waits for it, and not for those beside it.
+# alone: who works on a file waits for it, and not for those beside it. A source with BEGINS_BATCH is the first of those that
+# include a header of which the ones before it know nothing, and need not be compiled anew after a change of it.
 execute_process(COMMAND git diff --name-only HEAD WORKING_DIRECTORY ${CMAKE_SOURCE_DIR} OUTPUT_VARIABLE changed ERROR_QUIET)
 string(REPLACE "\n" ";" forereach_changed "${changed}")
 function(forereach_batches target directory)
@@ -42,9 +43,11 @@ function(forereach_batches target directory)
   set(count 0)
   set(batches "")
   foreach(source ${sources} "end")
-    get_source_file_property(options ${source} TARGET_DIRECTORY ${target} COMPILE_OPTIONS)
-    get_source_file_property(definitions ${source} TARGET_DIRECTORY ${target} COMPILE_DEFINITIONS)
-    if(source STREQUAL "end" OR count EQUAL at_once)
+    cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${directory} OUTPUT_VARIABLE file)
+    get_source_file_property(options ${file} TARGET_DIRECTORY ${target} COMPILE_OPTIONS)
+    get_source_file_property(definitions ${file} TARGET_DIRECTORY ${target} COMPILE_DEFINITIONS)
+    get_source_file_property(begins ${file} TARGET_DIRECTORY ${target} BEGINS_BATCH)
+    if(source STREQUAL "end" OR count EQUAL at_once OR begins)
       if(count GREATER 0)
         list(LENGTH batches number)
         set(batch ${binary}/${target}.together/${number}.cpp)

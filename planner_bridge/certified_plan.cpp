@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "forereach/certify/tube.h"
 #include "planner_bridge/lessons.h"
 
 namespace forereach {

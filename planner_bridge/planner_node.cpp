@@ -18,6 +18,7 @@
 #include "certifier/gate/stamp.h"
 #include "clients/planner_client.h"
 #include "forereach/numerics/directed.h"
+#include "forereach/sets/zonotope.h"
 #include "lcmtypes/names.h"
 #include "planner_bridge/reference.h"
 #include "task/json_text.h"

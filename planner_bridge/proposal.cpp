@@ -26,6 +26,7 @@
 #include <Eigen/QR>
 
 #include "forereach/certify/extender.h"
+#include "forereach/certify/tube.h"
 #include "forereach/numerics/size.h"
 #include "forereach/safety/clearance.h"
 #include "forereach/safety/limit_values.h"

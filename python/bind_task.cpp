@@ -3,6 +3,7 @@
 
 #include <pybind11/stl.h>
 
+#include "forereach/certify/tube.h"
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/parallel.h"
 #include "identify/declare_by.h"

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/safety/separation.h"
 #include "forereach/sets/zonogon.h"
 #include "lcmtypes/names.h"

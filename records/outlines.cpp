@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "forereach/certify/tube.h"
 #include "forereach/numerics/size.h"
 #include "forereach/sets/zonogon.h"
 

@@ -13,6 +13,7 @@
 
 #include <librsvg/rsvg.h>
 
+#include "forereach/certify/tube.h"
 #include "records/outlines.h"
 #include "records/output_file.h"
 

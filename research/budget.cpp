@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "forereach/certify/tube.h"
 #include "research/experiment.h"
 #include "research/methods/cp_sls.h"
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 
+#include "forereach/certify/tube.h"
 #include "forereach/sets/zonogon.h"
 
 namespace forereach::research {

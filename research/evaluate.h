@@ -3,6 +3,7 @@ the answer is true of the target. */
 #pragma once
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 #include "research/membership.h"
 #include "research/scenarios.h"
 #include "research/truth.h"

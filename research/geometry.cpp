@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "forereach/certify/tube.h"
 #include "forereach/sets/zonogon.h"
 #include "research/evaluate.h"
 #include "research/experiment.h"

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 
 namespace forereach {
 

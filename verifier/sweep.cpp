@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "forereach/numerics/size.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach::verifier {
 namespace {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "forereach/certify/tube.h"
 #include "forereach/numerics/size.h"
 #include "forereach/safety/clearance.h"
 

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "certifier/gate/stamp.h"
+#include "forereach/sets/zonotope.h"
 #include "task/step_time.h"
 
 namespace forereach {

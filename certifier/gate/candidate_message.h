@@ -8,12 +8,13 @@
 #include "forereach/certify/decision.h"
 #include "forereach/dynamics/model.h"
 #include "forereach/safety/body.h"
-#include "forereach/sets/zonotope.h"
 #include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/codec.h"
 #include "task/gate_options.h"
 
 namespace forereach {
+
+class Zonotope;
 
 /** u_0 .. u_{T-1} and their schedule. Refers to the candidate's numbers; whether its counts fit is for
 Certifier::Require to say. */

@@ -16,7 +16,10 @@
 #include "certifier/gate/stamp.h"
 #include "forereach/certify/batch.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/pieces.h"
+#include "forereach/certify/tube.h"
 #include "forereach/numerics/text.h"
+#include "forereach/sets/zonotope.h"
 #include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
@@ -45,6 +48,19 @@ std::optional<RobotMotion> MotionOf(const Config& config) {
 
 }  // namespace
 
+// The parts of a candidate that is judged once more, and whether it is judged as before.
+struct Gate::Again {
+  Plan plan;
+  Zonotope initial_set;
+  Decision verdict;
+};
+
+// The last candidate that was certified.
+struct Gate::Rehearsal {
+  std::vector<std::uint8_t> bytes;
+  Zonotope initial_set;
+};
+
 Gate::Gate(const Config& config)
     : certifier_(config.problem),
       motion_(MotionOf(config)),
@@ -54,8 +70,11 @@ Gate::Gate(const Config& config)
       transitions_(config.grounds.observations),
       obstacles_(config),
       sources_(Microseconds(config.gate.max_age_ms) + Microseconds(config.gate.max_ahead_ms)),
+      tube_(std::make_unique<Tube>()),
       pieces_(config.gate.max_pieces > 1 ? std::make_unique<Pieces>() : nullptr),
       rehearsal_(config.realtime.keep_warm ? std::make_unique<Rehearsal>() : nullptr) {}
+
+Gate::~Gate() = default;
 
 void Gate::Inherit(const Gate& before) {
   obstacles_.Inherit(before.obstacles_);
@@ -121,7 +140,7 @@ Gate::Choice Gate::Choose(const candidate_batch_t& batch, std::int64_t now_us, c
                                      .clock = clock,
                                      // The other half is for the decision on the one that is chosen.
                                      .deadline = now_us + Microseconds(options_.decision_budget_ms) / 2,
-                                     .tubes = std::span(&tube_, 1)});
+                                     .tubes = std::span(tube_.get(), 1)});
   const auto certified = std::ranges::find(decisions, Outcome::kCertified, &Decision::outcome) - decisions.begin();
   if (certified < count) return {static_cast<int>(certified), at(static_cast<int>(certified))};
   std::map<std::string, int> causes;
@@ -288,7 +307,7 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
                    GateAnswer& answer) {
   const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
   certifier_.Require(plan, initial_set, obstacles_.indexed());
-  Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.indexed(), tube_);
+  Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.indexed(), *tube_);
   decision_t& decision = answer.decision;
   std::string how;
   if (pieces_ && verdict.outcome == Outcome::kSafety) {
@@ -301,7 +320,7 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
       return now + longest <= deadline;
     };
     const Decision in_pieces = pieces_->Certify(certifier_, plan, initial_set, obstacles_.indexed(), verdict,
-                                                options_.max_pieces, goes_on, tube_);
+                                                options_.max_pieces, goes_on, *tube_);
     const bool is_certified = in_pieces.outcome == Outcome::kCertified;
     how = is_certified ? CertifiedInPieces(pieces_->count()) : AlsoInPieces(pieces_->trials());
     if (is_certified) verdict = in_pieces;
@@ -316,7 +335,7 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
   decision.second_observation = verdict.second_observation;
   decision.margin = verdict.margin;
   decision.threshold = verdict.threshold;
-  const std::string sentence = Explain(verdict, certifier_.problem(), obstacles_.all(), plan, tube_) + how;
+  const std::string sentence = Explain(verdict, certifier_.problem(), obstacles_.all(), plan, *tube_) + how;
   SetText(decision.message, sentence);
   if (verdict.outcome != Outcome::kCertified) return;
   // In shadow mode no certificate is made, so none can be taken for one (docs/decisions.md).
@@ -335,14 +354,14 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& uphel
     const Zonotope initial_set = InitialSetOf(candidate);
     certifier_.Require(plan, initial_set, obstacles_.indexed());
     const Standing whole =
-        forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.indexed(), tube_, first_step);
+        forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.indexed(), *tube_, first_step);
     if (!pieces_ || whole.verdict.outcome != Outcome::kSafety) return whole;
     // A withdrawal waits for it no longer than a plan waits for its decision.
     const auto end =
         std::chrono::steady_clock::now() + std::chrono::microseconds(Microseconds(options_.decision_budget_ms));
     const Decision in_pieces = pieces_->Certify(
         certifier_, plan, initial_set, obstacles_.indexed(), whole.verdict, options_.max_pieces,
-        [&] { return std::chrono::steady_clock::now() < end; }, tube_, first_step);
+        [&] { return std::chrono::steady_clock::now() < end; }, *tube_, first_step);
     return in_pieces.outcome == Outcome::kCertified ? Standing{plan.num_steps, in_pieces} : whole;
   } catch (const std::exception&) {
     // Nothing stands: a withdrawal that is not needed costs a stop, one that is missing more.
@@ -359,7 +378,7 @@ void Gate::KeepWarm() noexcept {
   candidate_plan_t candidate;
   if (Decode(Bytes(bytes), candidate) != DecodeStatus::kOk) return;
   const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
-  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.indexed(), tube_);
+  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.indexed(), *tube_);
   if (verdict.outcome == Outcome::kCertified) Attest(candidate, decision, answer.certified.emplace());
 }
 
@@ -368,7 +387,7 @@ std::optional<Gate::Again> Gate::CertifyAgain(const candidate_plan_t& candidate,
   if (GroundsOf(decision) != grounds()) return std::nullopt;
   Again again{PlanOf(candidate, ScheduleOf(candidate, options_)), InitialSetOf(candidate), {}};
   certifier_.Require(again.plan, again.initial_set, obstacles_.indexed());
-  again.verdict = certifier_.Certify(again.plan, again.initial_set, obstacles_.indexed(), tube_);
+  again.verdict = certifier_.Certify(again.plan, again.initial_set, obstacles_.indexed(), *tube_);
   if (static_cast<int>(again.verdict.cause) != decision.cause || again.verdict.step != decision.step)
     return std::nullopt;
   return again;
@@ -393,7 +412,7 @@ std::optional<advice_t> Gate::Advise(const candidate_plan_t& candidate, const de
     const std::optional<Again> again = CertifyAgain(candidate, decision);
     if (!again) return std::nullopt;
     const std::vector<advice_change_t> changes =
-        ChangesFor({certifier_, again->plan, again->initial_set, obstacles_.indexed(), again->verdict}, tube_, effort);
+        ChangesFor({certifier_, again->plan, again->initial_set, obstacles_.indexed(), again->verdict}, *tube_, effort);
     if (changes.empty()) return std::nullopt;
     advice_t advice = AdviceOn(candidate, decision);
     advice.num_changes = static_cast<std::int16_t>(changes.size());
@@ -413,7 +432,7 @@ std::optional<advice_t> Gate::Repair(const candidate_plan_t& candidate, const de
     advice_t advice = AdviceOn(candidate, decision);
     const auto repair =
         FindRepair({certifier_, again->plan, again->initial_set, obstacles_.indexed(), again->verdict},
-                   candidate.progress_steps, {motion_ ? &*motion_ : nullptr, tail_steps_}, tube_, goes_on);
+                   candidate.progress_steps, {motion_ ? &*motion_ : nullptr, tail_steps_}, *tube_, goes_on);
     if (repair) SetProposal(*repair, candidate, advice);
     return advice;
   } catch (const std::exception&) {
@@ -442,7 +461,7 @@ void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision,
     for (int k = 0; k < candidate.num_states; ++k) {
       // Outward-rounded: the robot compares its state with these, and a state in X_t must not look like one that has
       // left.
-      const Interval hull = tube_.hull(t, k);
+      const Interval hull = tube_->hull(t, k);
       certified.slice_lower[t][k] = hull.lower;
       certified.slice_upper[t][k] = hull.upper;
     }

@@ -23,7 +23,6 @@ not, the caller calls Refuse. */
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/certify/certifier.h"
-#include "forereach/certify/pieces.h"
 #include "forereach/certify/standing.h"
 #include "forereach/certify/way_clear.h"
 #include "forereach/decision_t.hpp"
@@ -34,6 +33,8 @@ not, the caller calls Refuse. */
 #include "task/motion.h"
 
 namespace forereach {
+
+class Pieces;
 
 /** A decision and, only with a certificate, the certified plan. */
 struct GateAnswer {
@@ -48,6 +49,7 @@ class Gate final {
 
   /** @throws std::invalid_argument as Certifier does. */
   explicit Gate(const Config& config);
+  ~Gate();
 
   [[nodiscard]] const Certifier& certifier() const { return certifier_; }
   /** The digest of the task's transitions: grounds().observations before anything was learned. */
@@ -59,7 +61,7 @@ class Gate final {
   /** Stamp and arrival of the obstacles in force; nothing if none were received. */
   [[nodiscard]] const std::optional<Arrival>& obstacles_arrival() const { return obstacles_.arrival(); }
   /** The tube of the last plan that reached the certifier; boxes around its slices, if it was certified in pieces. */
-  [[nodiscard]] const Tube& tube() const { return tube_; }
+  [[nodiscard]] const Tube& tube() const { return *tube_; }
 
   /** Decides on one candidate, or on one of a batch (lcmtypes/candidate_batch.h): the first that is certified by half
   of gate.decision_budget_ms, otherwise candidate 0. It is then decided on as if it was sent alone; the message says
@@ -149,17 +151,8 @@ class Gate final {
     std::string how;
   };
 
-  // The parts of a candidate that is judged once more, and whether it is judged as before.
-  struct Again {
-    Plan plan;
-    Zonotope initial_set;
-    Decision verdict;
-  };
-  // The last candidate that was certified.
-  struct Rehearsal {
-    std::vector<std::uint8_t> bytes;
-    Zonotope initial_set;
-  };
+  struct Again;
+  struct Rehearsal;
   [[nodiscard]] std::optional<Again> CertifyAgain(const candidate_plan_t& candidate, const decision_t& decision);
   [[nodiscard]] advice_t AdviceOn(const candidate_plan_t& candidate, const decision_t& decision) const;
 
@@ -193,7 +186,7 @@ class Gate final {
   Sources sources_;
   std::int64_t decisions_ = 0, certificates_ = 0;
   certifier_status_t counts_{};
-  Tube tube_;
+  std::unique_ptr<Tube> tube_;
   std::unique_ptr<Pieces> pieces_;        ///< With gate.max_pieces above 1.
   std::unique_ptr<Rehearsal> rehearsal_;  ///< With realtime.keep_warm.
 };

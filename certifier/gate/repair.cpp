@@ -12,6 +12,7 @@
 #include "forereach/numerics/size.h"
 #include "forereach/safety/clearance.h"
 #include "forereach/safety/limit_values.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 namespace {

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "forereach/certify/tube.h"
 #include "forereach/numerics/arithmetic.h"
 #include "forereach/numerics/require.h"
 #include "forereach/numerics/size.h"

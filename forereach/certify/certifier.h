@@ -16,7 +16,6 @@ and throws nothing. Learn adds later observations between two calls of Certify. 
 #include "forereach/certify/problem.h"
 #include "forereach/certify/rates.h"
 #include "forereach/certify/safety.h"
-#include "forereach/certify/tube.h"
 #include "forereach/reach/propagator.h"
 #include "forereach/residual/affine_rows_enclosure.h"
 #include "forereach/residual/enclosure.h"

@@ -7,6 +7,7 @@
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/rates.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/unbounded.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"

@@ -1,4 +1,5 @@
 #include "forereach/certify/extender.h"
+#include "forereach/certify/tube.h"
 
 #include <algorithm>
 #include <cmath>

@@ -14,6 +14,9 @@ Certify judges the plan before it is used. */
 #include <vector>
 
 #include "forereach/certify/certifier.h"
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/interval.h"
+#include "forereach/sets/zonotope_arrays.h"
 
 namespace forereach {
 

@@ -17,6 +17,8 @@ that failed. Every halving of a state is expected to gain half as much as the on
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/piece_cut.h"
+#include "forereach/certify/tube.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 

@@ -8,6 +8,7 @@
 #include "forereach/numerics/size.h"
 #include "forereach/residual/lipschitz_row.h"
 #include "forereach/sets/order_reduction.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 namespace {

@@ -25,9 +25,10 @@ input, w^ is its sup over the hull of Z_t, with the inputs that act. */
 #include "forereach/residual/enclosure.h"
 #include "forereach/residual/growing_disturbance.h"
 #include "forereach/residual/region_grid.h"
-#include "forereach/sets/zonotope.h"
 
 namespace forereach {
+
+class Zonotope;
 
 /** Intermediate results of one step. */
 struct StepRecord {

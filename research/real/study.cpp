@@ -8,6 +8,7 @@
 #include <Eigen/QR>
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/text_model.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"

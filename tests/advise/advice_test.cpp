@@ -2,6 +2,7 @@
 // certifier of its own; every remedy of an answer without a judgement likewise, by a gate of its own.
 #include "advise/advice.h"
 
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "advise/gate_advice.h"

@@ -2,6 +2,7 @@
 // they claim to be.
 #include "bench/straightforward.h"
 
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "bench/latencies.h"

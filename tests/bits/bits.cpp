@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/equations_model.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "own_model.h"

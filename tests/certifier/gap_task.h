@@ -4,6 +4,7 @@ of X_0 just may touch. */
 
 #include "certifier/gate/candidate_message.h"
 #include "forereach/numerics/text.h"
+#include "forereach/sets/zonotope.h"
 #include "task/config.h"
 #include "tests/gap.h"
 #include "tests/paths.h"

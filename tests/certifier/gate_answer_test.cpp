@@ -1,4 +1,5 @@
 // The gate's answer to an admitted candidate: outcomes, witnesses, digests, slices, counts.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "certifier/gate/candidate_message.h"

@@ -1,6 +1,7 @@
 // Random mutations of valid candidates, and the same bytes twice.
 #include <bit>
 
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "certifier/gate/gate.h"

@@ -3,6 +3,7 @@
 #include "advise/gate_advice.h"
 #include "certifier/gate/gate.h"
 #include "cli/abstention_advice.h"
+#include "forereach/certify/tube.h"
 #include "forereach/obstacles_t.hpp"
 #include "tests/certifier/gap_task.h"
 #include "tests/cli/program.h"

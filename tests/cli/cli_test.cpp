@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <regex>
 
+#include "forereach/certify/tube.h"
 #include "tests/cli/program.h"
 #include "tests/task/task_files.h"
 

@@ -4,6 +4,7 @@
 
 #include "forereach/dynamics/unbounded.h"
 #include "forereach/numerics/size.h"
+#include "forereach/sets/zonotope.h"
 #include "task/task_template.h"
 #include "tests/cli/program.h"
 #include "tests/task/task_files.h"

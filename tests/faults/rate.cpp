@@ -7,6 +7,7 @@
 #include "bus/authentic.h"
 #include "certifier/gate/candidate_message.h"
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "tests/faults/demo_task.h"

@@ -1,4 +1,5 @@
 // Affine rows of the residual in the certifier: a wrong gain, what bounds it, and what contradicts it.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"

@@ -2,6 +2,7 @@
 // certifier refuses to be made of.
 #include "forereach/certify/certifier.h"
 
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/explain.h"

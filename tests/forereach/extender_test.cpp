@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/safety/obstacle_index.h"

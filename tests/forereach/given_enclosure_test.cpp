@@ -1,4 +1,5 @@
 // A certifier over an enclosure of the residual that the caller supplies.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"

@@ -1,4 +1,5 @@
 // A certifier that learns transitions gives the same answers as one that had them from the start.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"

@@ -1,6 +1,7 @@
 // Limits on functions of state and input: just inside and just outside, which samples count, what comes first.
 #include "forereach/certify/limits.h"
 
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"

@@ -1,4 +1,5 @@
 // Parts of a body that stand at expressions of the state: an arm whose links just clear an obstacle, and just do not.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"

@@ -1,4 +1,5 @@
 // Declared bounds on rates that a transition contradicts: then nothing is certified.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"

@@ -1,4 +1,5 @@
 // Regions in the certifier: what they narrow, what contradicts them, and what is refused.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Which errors of steps a problem may declare, and what a step adds for them.
+#include "forereach/certify/tube.h"
 #include "forereach/reach/step_offsets.h"
 
 #include "tests/test.h"

@@ -1,4 +1,5 @@
 // Bodies, motion between samples, and obstacles that move: each at its boundary, just inside and just outside.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"

@@ -1,4 +1,5 @@
 // A declared turn rate that the plan's own slices contradict: there is no motion that it describes.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/explain.h"

@@ -2,6 +2,7 @@
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/models/named_models.h"
 
 int main() {

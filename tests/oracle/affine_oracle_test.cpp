@@ -1,5 +1,6 @@
 // Affine rows of the residual: bounds, hulls and contradictions against rationals, and rollouts of residuals that the
 // data admit, in 256 bits, against tubes.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include <numeric>

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "forereach/certify/decision.h"
+#include "forereach/certify/tube.h"
 #include "tests/oracle/problems.h"
 
 namespace forereach {

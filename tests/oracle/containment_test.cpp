@@ -1,5 +1,6 @@
 // What a certificate claims, tried: rollouts of many residuals that satisfy data and declaration, in 256 bits, never
 // leave a slice of the tube, and under a certified plan never meet an obstacle.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "tests/oracle/admissible.h"

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "command_line/command_line.h"
+#include "forereach/certify/tube.h"
 #include "tests/oracle/affine_problems.h"
 #include "tests/oracle/motions.h"
 #include "tests/oracle/region_problems.h"

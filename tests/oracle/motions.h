@@ -26,6 +26,7 @@ and no certifier that learns them finds a contradiction. */
 
 #include "forereach/certify/rates.h"
 #include "forereach/certify/standing.h"
+#include "forereach/certify/tube.h"
 #include "forereach/numerics/size.h"
 #include "lcmtypes/angle.h"
 #include "tests/oracle/admissible.h"

@@ -1,5 +1,6 @@
 // A step of an affine model against exact rationals: the successor's support is nowhere below that of the exact image,
 // whichever way the model is expanded.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"

@@ -1,5 +1,6 @@
 // Regions against rationals: residuals that use up what L and the regions allow, on the cheapest ways between many
 // points, stay within the bounds.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/residual/regional_enclosure.h"

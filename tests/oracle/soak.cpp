@@ -13,6 +13,7 @@
 
 #include "command_line/command_line.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/safety/separation.h"
 #include "tests/oracle/problems.h"
 

@@ -1,5 +1,6 @@
 // The verifier's envelope against rational numbers, where recorded observations contradict each other by less than
 // doubles show.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/residual/consistency.h"

@@ -1,3 +1,4 @@
+#include "forereach/certify/tube.h"
 #include "planner_bridge/certified_plan.h"
 
 #include "tests/test.h"

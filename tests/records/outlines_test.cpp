@@ -1,4 +1,5 @@
 // What a picture shows of a body: a sweep contains the body at every sample that it spans, and predictions grow.
+#include "forereach/certify/tube.h"
 #include "records/outlines.h"
 
 #include "tests/test.h"

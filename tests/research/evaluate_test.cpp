@@ -1,4 +1,5 @@
 // One plan under one method: the certifier's own answers, and a coverage test that detects missing coverage.
+#include "forereach/certify/tube.h"
 #include "research/evaluate.h"
 
 #include "tests/test.h"

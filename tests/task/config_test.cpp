@@ -1,4 +1,5 @@
 // What a good task file means.
+#include "forereach/sets/zonotope.h"
 #include "task/config.h"
 
 #include <regex>

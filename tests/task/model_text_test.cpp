@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/expression.h"
 #include "task/canonical.h"
 #include "tests/task/task_files.h"

@@ -2,6 +2,7 @@
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/text_model.h"
 #include "simulator/target.h"
 #include "task/schema.h"

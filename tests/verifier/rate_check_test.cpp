@@ -5,6 +5,7 @@
 
 #include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
+#include "tests/worlds.h"
 
 namespace forereach::rate_check_test {
 

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 #include "forereach/safety/separation.h"
 #include "forereach/sets/zonogon.h"
 #include "verifier/verifier.h"

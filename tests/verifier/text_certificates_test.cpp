@@ -1,4 +1,5 @@
 // Certificates of models that are texts: what the certifier claims, the verifier derives by its own parser.
+#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/dynamics/text_model.h"

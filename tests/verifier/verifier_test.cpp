@@ -1,5 +1,6 @@
 // Certificates made by hand, true by a hair and false by a hair, and the certifier's own with one thing changed.
 
+#include "forereach/certify/tube.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/verifier/hand_made.h"
 #include "tests/verifier/record.h"
