@@ -23,11 +23,12 @@ inline std::vector<LogEvent> CourseEvents() {
   return events;
 }
 
-/** Sends a watcher decisions of the course, each under another set of so many obstacles. */
+/** Sends a watcher decisions as the last one of a run, each under another set of so many obstacles. */
 class Crowd {
  public:
-  Crowd(Watcher& watcher, std::size_t size) : watcher_(watcher), size_(size) {
-    for (const LogEvent& event : CourseEvents())
+  Crowd(Watcher& watcher, std::size_t size, const std::vector<LogEvent>& run = CourseEvents())
+      : watcher_(watcher), size_(size) {
+    for (const LogEvent& event : run)
       if (const auto decision = Decoded<decision_t>(event.message())) decision_ = *decision, now_ = event.utime;
   }
 
@@ -50,7 +51,7 @@ class Crowd {
 
   Watcher& watcher_;
   const std::size_t size_;
-  decision_t decision_{};  // of the course, the last one
+  decision_t decision_{};
   std::int64_t now_ = 0;
   double x_ = 0;
   const Config task_ = CourseTask();
