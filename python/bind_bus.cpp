@@ -2,6 +2,7 @@
 #include <iterator>
 
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include "certifier/gate/repair.h"
 #include "clients/planner_client.h"
@@ -118,7 +119,7 @@ void BindBus(py::module_& module) {
                          R"(A planner's end of the bus: candidates out, decisions and the robot's states in.
 
 Messages are signed and checked as those of the other processes. Only the thread that opened it may use it.)")
-      .def(py::init([](std::shared_ptr<JudgingTask> task, const std::string& key, const std::string& url,
+      .def(py::init([](std::shared_ptr<JudgingTask> task, const fs::path& key, const std::string& url,
                        const std::string& source) { return std::make_unique<PlannerBus>(task, key, url, source); }),
            py::arg("task"), py::arg("key") = "", py::arg("url") = "", py::arg("source") = "python",
            "key: the planner's key file, or a directory with it; url: of the bus. By default those of the task.")

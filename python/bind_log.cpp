@@ -1,4 +1,5 @@
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
 #include <span>
@@ -76,8 +77,8 @@ struct Log {
   LogKey key;
 };
 
-Log OpenLog(const std::string& path, const std::string& config, const std::string& key, bool unchecked) {
-  NamedRuns named = RunsNamedBy({path}, 1);
+Log OpenLog(const fs::path& path, const fs::path& config, const fs::path& key, bool unchecked) {
+  NamedRuns named = RunsNamedBy({path.string()}, 1);
   for (const RunLogs& run : named.runs) {
     for (const RunRow& row : run.missing) named.missing.push_back(WhyMissing(row));
     if (!run.logs.empty()) RequireLogs(run.logs);

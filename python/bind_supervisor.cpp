@@ -3,6 +3,7 @@
 #include <utility>
 
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include "clients/robot_client.h"
 #include "python/arrays.h"
@@ -36,11 +37,9 @@ class PythonRobot final : public RobotClient::Robot {
     error_ = error.is_none() ? std::vector<double>() : numbers(error, "state_error");
   }
 
-  std::span<const double> state() const override {
-    if (!robot_.is_none()) return Numbers("state", state_);
-    if (state_.empty()) throw std::runtime_error("no state was measured yet");
-    return state_;
-  }
+  // Of a robot that is None, and before its first boundary: no entries. Nothing is executed or reported of it until
+  // then.
+  std::span<const double> state() const override { return robot_.is_none() ? state_ : Numbers("state", state_); }
   std::span<const double> state_error() const override {
     return Has("state_error") ? Numbers("state_error", error_) : error_;
   }
@@ -164,10 +163,9 @@ comes to rest by its own means; and, where it has them, steps_to_rest(lower, upp
 reload(). An exception in one of them stops the robot and goes to sys.unraisablehook. Only the thread that made it may
 use it.
 
-Without a `robot` you give each boundary its state, the first one before you listen, and come to rest by your own means
-where `control` is None.)")
+Without a `robot` you give each boundary its state, and come to rest by your own means where `control` is None.)")
       .def(py::init(
-               [](std::shared_ptr<JudgingTask> task, py::object robot, const std::string& key, const std::string& url) {
+               [](std::shared_ptr<JudgingTask> task, py::object robot, const fs::path& key, const std::string& url) {
                  return std::make_unique<BusSupervisor>(task, std::move(robot), key, url);
                }),
            py::arg("task"), py::arg("robot") = py::none(), py::arg("key") = "", py::arg("url") = "",

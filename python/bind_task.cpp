@@ -2,6 +2,7 @@
 #include <iterator>
 
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include "forereach/certify/tube.h"
 #include "forereach/numerics/directed.h"
@@ -46,7 +47,7 @@ Eigen::MatrixXd RowsOf(const py::handle& given, const std::string& name) {
       numbers.data(), numbers.shape(0), numbers.shape(1));
 }
 
-TaskPointer MakeTask(const py::object& task, const std::string& path, const py::object& data, const py::kwargs& keys) {
+TaskPointer MakeTask(const py::object& task, const fs::path& path, const py::object& data, const py::kwargs& keys) {
   if (task.is_none() == keys.empty())
     throw std::invalid_argument("task: must be a dict or a text, or its keys by name");
   py::object whole = task.is_none() ? keys : task;
@@ -68,7 +69,7 @@ TaskPointer MakeTask(const py::object& task, const std::string& path, const py::
   return std::make_shared<JudgingTask>(ConfigOfText(path, text, transitions ? &*transitions : nullptr));
 }
 
-TaskPointer LoadTaskFile(const std::string& path) { return std::make_shared<JudgingTask>(LoadConfig(path)); }
+TaskPointer LoadTaskFile(const fs::path& path) { return std::make_shared<JudgingTask>(LoadConfig(path)); }
 
 // ---- Certifying.
 

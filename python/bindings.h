@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 
 #include <pybind11/pybind11.h>
@@ -11,6 +12,7 @@
 namespace forereach {
 
 namespace py = pybind11;
+namespace fs = std::filesystem;
 
 void BindTask(py::module_& module);
 void BindLog(py::module_& module);

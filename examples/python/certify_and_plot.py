@@ -7,7 +7,7 @@ import numpy as np
 import forereach as fr
 
 here = Path(__file__).parent
-task = fr.Task.load(str(here / "rover.yaml"))
+task = fr.Task.load(here / "rover.yaml")
 
 # Twenty-four steps: speed up to the right and upwards, and brake to rest.
 U = np.repeat([[2.8, 1.6], [-2.8, -1.6]], 12, axis=0)

@@ -8,7 +8,7 @@ import numpy as np
 
 import forereach as fr
 
-task = fr.Task.load(str(Path(__file__).parent / "rover.yaml"))
+task = fr.Task.load(Path(__file__).parent / "rover.yaml")
 rng = np.random.default_rng(2)
 half, width = 8, np.array([0.02, 0.02, 0.01, 0.01])
 

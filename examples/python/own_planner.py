@@ -7,7 +7,7 @@ import numpy as np
 import forereach as fr
 
 picture, url, keys = (sys.argv[1:] + ["own_planner.png", "", ""][len(sys.argv) - 1 :])[:3]
-task = fr.Task.load(str(Path(__file__).parent / "rover.yaml"))
+task = fr.Task.load(Path(__file__).parent / "rover.yaml")
 bus = fr.Bus(task, key=keys, url=url)
 goal = np.array([1.2, 0.95])
 rng = np.random.default_rng(1)

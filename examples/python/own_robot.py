@@ -27,7 +27,7 @@ class Rover:
 
 
 url, keys = (sys.argv[1:] + ["", ""])[:2]
-task = fr.Task.load(str(Path(__file__).parent / "rover.yaml"))
+task = fr.Task.load(Path(__file__).parent / "rover.yaml")
 rover = Rover()
 supervisor = fr.Supervisor(task, rover, key=keys, url=url)
 boundary = time.time_ns() // 1000

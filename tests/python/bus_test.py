@@ -201,6 +201,22 @@ class Ends(BusTest):
         self.assertTrue(robot.halted)
         self.assertEqual(robot.counts["steps_inside"], 4)
 
+    def test_of_a_robot_that_began_anew_take_a_plan_before_they_are_given_a_state(self):
+        self.start_certifier()
+        task = fr.Task.load(TASK)
+        before, anew = (fr.Supervisor(task, key=Path(self.keys), url=URL) for _ in range(2))
+        bus, x, step, boundary, start = fr.Bus(task, key=Path(self.keys), url=URL), np.zeros(4), round(task.dt * 1e6), now(), 0
+        while anew.counts["accepted"] == 0:
+            before.listen(boundary)
+            before.boundary(boundary, state=x)
+            if boundary > start:
+                start = boundary + 8 * step
+                bus.propose([[0.5, 0.0]] * 8 + [[-0.5, 0.0]] * 8, (x, np.full(4, 0.01)), start)
+            anew.listen(now())
+            boundary += step
+        anew.boundary(boundary, state=x)
+        self.assertEqual((anew.counts["errors"], anew.counts["boundaries"]), (0, 1))
+
     def test_of_a_robot_without_functions_say_what_their_caller_has_to_give(self):
         task = fr.Task.load(TASK)
         own, other = fr.Supervisor(task, key=self.keys, url=URL), self.supervisor(Rover())
@@ -297,7 +313,7 @@ class Ends(BusTest):
         self.start_certifier(str(path))
         self.start(sys.executable, "-B", "-c", Path("examples/python/own_robot.py").read_text().replace(
             'Path(__file__).parent / "rover.yaml"', repr(str(path))), URL, self.keys)
-        task = fr.Task.load(str(path))
+        task = fr.Task.load(path)
         bus = fr.Bus(task, key=self.keys, url=URL)
         push = 3 * np.array([0.9, 0.5]) / np.hypot(0.9, 0.5)
         U = np.concatenate([np.tile(push, (10, 1)), np.tile(-push, (10, 1))])  # ends at the first obstacle

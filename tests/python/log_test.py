@@ -114,11 +114,11 @@ class Columns(unittest.TestCase):
         file = self.scratch / "damaged.lcmlog"
         file.write_bytes(damaged)
         with self.assertWarnsRegex(UserWarning, "damaged in 1 place"):
-            rest = len(fr.Log(str(file), config=TASK).decisions()["utime"])
+            rest = len(fr.Log(file, config=Path(TASK)).decisions()["utime"])
         self.assertTrue(0 < rest <= whole)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            self.assertRaises(UserWarning, fr.Log(str(file), config=TASK).decisions)
+            self.assertRaises(UserWarning, fr.Log(file, config=Path(TASK)).decisions)
 
     def test_of_what_is_no_log_are_an_error(self):
         empty = self.scratch / "empty"
