@@ -517,7 +517,7 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
     world.notes.push_back(fmt::format(
         "Windows are seconds from time step 0, of {} s. From one state to the next, an obstacle is taken to move on a "
         "straight line and to turn evenly. The first prediction ends at {} s: of later times nothing is known.",
-        ToText(step), ToText(*obstacles.first_end() * step)));
+        ToText(step), RoundedDown(*obstacles.first_end() * step)));
   return world;
 }
 

@@ -25,6 +25,9 @@ using Json = nlohmann::json;
 
 constexpr std::int64_t kLargestDrawing = 64 * kMegabyte;
 constexpr double kFarthest = 1e9;  // m, of a coordinate
+// So near to the equator and the first meridian, where nobody drives, metres of Web Mercator are those of the ground to
+// 1.3 millionths: a map's own, whatever the file calls them.
+constexpr double kMercatorIsGround = 1e4;
 
 // ---- From degrees to metres
 
@@ -107,21 +110,25 @@ class Drawing {
     std::optional<double> width, radius;
   };
 
-  // What GeoJSON before RFC 7946 says its coordinates are. Whether they are degrees.
+  // What GeoJSON before RFC 7946 says its coordinates are, by the properties of its crs or by a text instead of them.
+  // Whether they are degrees.
   [[nodiscard]] bool TakeReferenceSystem(const Json& document) {
-    const Json* at = &document;
-    for (const char* key : {"crs", "properties", "name"}) {
-      if (!at->is_object() || !at->contains(key)) return false;
-      at = &(*at)[key];
-    }
+    if (!document.is_object() || !document.contains("crs")) return false;
+    const Json* at = &document["crs"];
+    for (const char* key : {"properties", "name"})
+      if (at->is_object() && at->contains(key)) at = &(*at)[key];
     if (!at->is_string()) return false;
     const std::string system = at->get<std::string>();
     const auto is = [&](std::string_view code) { return system.ends_with(code); };
-    if (is(":3857") || is(":900913") || is(":3785"))
-      throw ConfigError(
-          "{}: crs: {} is Web Mercator, whose metres are not those of the ground; `ogr2ogr -t_srs "
-          "EPSG:4326` makes degrees of them, for --origin",
-          path_, system.substr(0, 80));
+    if (is(":3857") || is(":900913") || is(":3785")) {
+      if (!options_.are_metres || options_.origin)
+        throw ConfigError(
+            "{}: crs: {} is Web Mercator, whose metres are not those of the ground; `ogr2ogr -t_srs EPSG:4326` makes "
+            "degrees of them, for --origin. If the file says so of a map's own metres, as editors of routes do, give "
+            "--metres",
+            path_, system.substr(0, 80));
+      farthest_ = kMercatorIsGround;
+    }
     if (is("CRS84") || is(":4326")) return true;
     world_.notes.push_back(
         fmt::format("Coordinates are taken as metres of a plane, with the crs {}.", system.substr(0, 80)));
@@ -207,8 +214,9 @@ class Drawing {
                             TangentPlane::kReach));
       point = *place;
     }
-    if (!(std::abs(point.x) <= kFarthest && std::abs(point.y) <= kFarthest))
-      at.Fail(fmt::format("is farther than {} m", kFarthest));
+    if (!(std::abs(point.x) <= farthest_ && std::abs(point.y) <= farthest_))
+      at.Fail(fmt::format("is farther than {} m{}", farthest_,
+                          farthest_ < kFarthest ? ", where metres of Web Mercator are not those of the ground" : ""));
     lower_ = {std::min(lower_.x, point.x), std::min(lower_.y, point.y)};
     upper_ = {std::max(upper_.x, point.x), std::max(upper_.y, point.y)};
     any_ = true;
@@ -305,6 +313,7 @@ class Drawing {
   std::vector<Area> stay_in_;
   std::string stay_in_name_;
   double stay_in_bend_ = 0, largest_bend_ = 0;
+  double farthest_ = kFarthest;
   PlanePoint lower_{kInfinity, kInfinity}, upper_{-kInfinity, -kInfinity};
   bool any_ = false;
 };

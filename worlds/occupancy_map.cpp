@@ -255,8 +255,13 @@ World ReadOccupancyMap(const std::string& path, const MapOptions& options) try {
   if (!options.as_rectangles) world.Add(std::filesystem::path(path).stem().string(), Obstacle::Grid(grid));
   for (int block = 0; options.as_rectangles && block < std::ssize(grid->blocks()); ++block)
     world.Add(grid->cells(block).width > 0 ? "" : "beyond the map", grid->blocks()[ToSize(block)]);
+  const auto occupied = std::ranges::count(map.occupied, true);
   world.notes.push_back(fmt::format("{} by {} cells of {} m, {} of them occupied.", map.width, map.height,
-                                    ToText(map.resolution), std::ranges::count(map.occupied, true)));
+                                    ToText(map.resolution), occupied));
+  if (occupied == std::ssize(map.occupied))
+    world.notes.push_back(fmt::format(
+        "No cell is free: see free_thresh, {}, negate and mode, and whether the image is a map of what is occupied.",
+        ToText(file.free)));
   if (options.coarsen > 1)
     world.notes.push_back(fmt::format("{0} by {0} cells are occupied if one of them is.", options.coarsen));
   world.notes.push_back(options.unknown_is_free ? "Unknown cells are free, and so is all beyond the image."

@@ -230,7 +230,7 @@ TEST_F(CommonRoadTest, OccupancySetsAndShapesOfSeveralParts) {
                                occupancy(50, Between("time", 0, 5)) + "</occupancySet></phantomObstacle>");
   EXPECT_TRUE(Contains(world, At(3, 1), 0.15) && Contains(world, At(6, 1), 0.25) && Contains(world, At(50, 0), 0.5));
   EXPECT_FALSE(Contains(world, At(3, 0), 0.35) || Contains(world, At(9, 0), 0.05) || Contains(world, At(50, 0), 0.6));
-  EXPECT_THAT(world.notes, Contains(HasSubstr("The first prediction ends at 0.30")));
+  EXPECT_THAT(world.notes, Contains(HasSubstr("The first prediction ends at 0.3 s")));
 }
 
 TEST_F(CommonRoadTest, WithoutAPredictionItStands) {

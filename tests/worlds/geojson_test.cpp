@@ -121,14 +121,29 @@ TEST_F(GeoJsonTest, WhatTheCoordinatesAreIsReadWhereTheFileSaysIt) {
   const auto named = [&](const std::string& name) {
     return with_crs(R"({"type": "name", "properties": {"name": ")" + name + "\"}}");
   };
-  EXPECT_THAT(WhyNot(named("urn:ogc:def:crs:EPSG::3857")), HasSubstr("is Web Mercator"));
+  EXPECT_THAT(WhyNot(named("urn:ogc:def:crs:EPSG::3857"), {}), HasSubstr("is Web Mercator"));
   EXPECT_THAT(WhyNot(named("EPSG:900913"), {.origin = PlanePoint{0, 0}}), HasSubstr("ogr2ogr"));
+  EXPECT_THAT(WhyNot(with_crs("\"EPSG:3857\""), {}), HasSubstr("give --metres"));
   for (const char* degrees : {"urn:ogc:def:crs:OGC:1.3:CRS84", "EPSG:4326"})
     EXPECT_THAT(WhyNot(named(degrees), {}), HasSubstr("look like degrees")) << "eight of them are no metres";
   EXPECT_THAT(Drawing(named("EPSG:32632"), {}).notes, Contains(HasSubstr("with the crs EPSG:32632")));
   EXPECT_THAT(ObstaclesText(Drawing(named("a\\ntask: 1"), {}), "any"), Not(HasSubstr("\ntask: 1")));
-  for (const char* none : {"null", "[1]", "\"EPSG:3857\"", R"({"properties": 3})"})
+  for (const char* none : {"null", "[1]", R"({"properties": 3})"})
     EXPECT_TRUE(Drawing(with_crs(none), {}).notes.empty());
+}
+
+// An editor of routes calls a map's own metres Web Mercator. Near zero they are metres; farther away nothing says so.
+TEST_F(GeoJsonTest, MetresOfAMapMayBeCalledWebMercatorNearZeroAlone) {
+  const auto at = [](const std::string& x) {
+    return R"({"type": "Polygon", "crs": "EPSG:3857", "coordinates": [[[0,0],[)" + x + ",0],[8,8]]]}";
+  };
+  GeoJsonOptions metres;
+  metres.are_metres = true;
+  EXPECT_THAT(Drawing(at("10000"), metres).notes,
+              Contains(HasSubstr("taken as metres of a plane, with the crs EPSG:3857")));
+  EXPECT_THAT(WhyNot(at("10001"), metres), HasSubstr("farther than 10000 m, where metres of Web Mercator"));
+  metres.origin = PlanePoint{0, 0};
+  EXPECT_THAT(WhyNot(at("8"), metres), HasSubstr("is Web Mercator"));
 }
 
 TEST_F(GeoJsonTest, RefusesWhatIsNoneWithThePlace) {
