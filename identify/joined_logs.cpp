@@ -60,6 +60,7 @@ class LogJoiner {
     states_.not_a_number.insert(states_.not_a_number.end(), commands.not_a_number.begin() + 1,
                                 commands.not_a_number.end());
     states_.dates.count += commands.dates.count;
+    if (states_.decimal_commas.count == 0) states_.decimal_commas = commands.decimal_commas;
   }
 
   LogTable Join() {

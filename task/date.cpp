@@ -44,17 +44,19 @@ std::optional<int> ZoneOf(std::string_view text) {
 
 std::optional<long double> SecondsOfDate(std::string_view text) {
   const int year = TakeDigits(text, 4);
-  if (year < 0 || !Take(text, '-')) return std::nullopt;
+  const bool is_basic = !text.starts_with('-');  // no separators at all
+  const auto separates = [&](char c) { return is_basic || Take(text, c); };
+  if (year < 0 || !separates('-')) return std::nullopt;
   const int month = TakeDigits(text, 2);
-  if (month < 0 || !Take(text, '-')) return std::nullopt;
+  if (month < 0 || !separates('-')) return std::nullopt;
   const int day = TakeDigits(text, 2);
   const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
                                          std::chrono::day(static_cast<unsigned>(day))};
   if (day < 0 || !date.ok() || !(Take(text, 'T') || Take(text, 't') || Take(text, ' '))) return std::nullopt;
   const int hour = TakeDigits(text, 2);
-  if (hour < 0 || hour > 23 || !Take(text, ':')) return std::nullopt;
+  if (hour < 0 || hour > 23 || !separates(':')) return std::nullopt;
   const int minute = TakeDigits(text, 2);
-  if (minute < 0 || minute > 59 || !Take(text, ':')) return std::nullopt;
+  if (minute < 0 || minute > 59 || !separates(':')) return std::nullopt;
   const int second = TakeDigits(text, 2);
   if (second < 0 || second > 60) return std::nullopt;
   long double fraction = 0;

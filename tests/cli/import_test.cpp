@@ -215,6 +215,8 @@ TEST_F(ForeignLogTest, InputsMayBeInALogOfTheirOwn) {
   EXPECT_THAT(Import(states, from + " --inputs-time when --command-delay 1"), Exits(2, "--inputs-from: has no rows"));
   EXPECT_THAT(Import(states, "--inputs-time when"), Exits(2, "--inputs-time: needs --inputs-from"));
   EXPECT_THAT(Import(states, from + " --rate 10"), Exits(2, "--inputs-from: needs stamps"));
+  const std::string commas = " --inputs-from " + scratch_.Write("commas.csv", "time;a\n0,0;1,5\n9,0;1,5\n");
+  EXPECT_THAT(Import(states, commas), Exits(1, "4  numbers with a decimal comma: give --decimal comma"));
 }
 
 TEST_F(ForeignLogTest, StampsMayBeDatesOrSecondsAndNanoseconds) {
