@@ -95,6 +95,7 @@ nlohmann::json ResidualJson(const Config& config) {
 
 Digest ResidualDigest(const Config& config) {
   CanonicalBytes bytes("forereach residual");
+  // The domain, too: a slope that holds in one says nothing of a larger one.
   bytes.Texts(ArgumentNames(config));
   const Domain& domain = config.problem->domain;
   for (const Box* box : {&domain.state, &domain.input}) {

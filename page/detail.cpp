@@ -77,6 +77,7 @@ Eigen::AlignedBox2d FrameOf(const Units& units, const PageDetail& detail, const 
       if ((point - center).cwiseAbs().maxCoeff() < 1.5 * size)
         for (const double way : {-decides->radius, decides->radius})
           frame.extend(point + Eigen::Vector2d::Constant(way));
+  // A margin; and what is flat, as a drive along a line, gets the height of a page's drawing.
   Eigen::Vector2d half = frame.sizes() / 2 + Eigen::Vector2d::Constant(std::max(0.12 * frame.sizes().maxCoeff(), 1e-3));
   half.y() = std::max(half.y(), 0.45 * half.x());
   return {frame.center() - half, frame.center() + half};

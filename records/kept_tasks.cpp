@@ -91,6 +91,7 @@ TaskCopy CopyTask(const Config& config) {
       config.grounds.config, config.grounds.observations, config.problem->model, BytesOf(config.path), {}, {}, {}};
   const NamedFiles named = FilesNamedBy(config.path);
   if (!named.model.empty()) copy.model_file = BytesOf(named.model);
+  // The files are read a second time here: what changed since would be kept under a digest that is not its own.
   if (TaskDigest(copy.task, copy.model_file) != config.grounds.config)
     throw ConfigError("{}: has changed since it was read{}", config.path,
                       named.model.empty() ? "" : fmt::format(", or {} has", named.model));
@@ -136,6 +137,7 @@ std::optional<Config> KeptTasks::Find(const Digest& digest,
   if (!fs::exists(task, no_path)) return std::nullopt;
   std::vector<std::string> versions = DigestsOfNames(directory, kTransitions, kTransitionsEnding);
   if (versions.empty()) throw ConfigError("{}: its transitions are not kept next to it", task);
+  // A task file may stay while its transitions change between runs: the log says which of them it knew.
   if (versions.size() > 1)
     std::erase_if(versions, [seen = observations()](const std::string& version) {
       return std::ranges::none_of(seen, [&](const Digest& named) { return ToHex(named) == version; });

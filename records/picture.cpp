@@ -131,10 +131,14 @@ class Painter final {
   }
 
   void PaintHeader() {
-    Write(picture_.title, kMargin, 33, 19, kInk, "font-weight=\"bold\"");
+    const auto fitting = [this](double width, double most) {
+      return std::clamp((width_ - 2 * kMargin) / width, 9.0, most);
+    };
+    constexpr double kBold = 1.2;  // as much wider
+    Write(picture_.title, kMargin, 33, fitting(kBold * TextWidth(picture_.title + " ", 1), 19), kInk,
+          "font-weight=\"bold\"");
     const std::string line = fmt::format("{}", fmt::join(picture_.key_numbers, "   \u00b7   "));
-    const double size = std::clamp((width_ - 2 * kMargin) / TextWidth(line + " ", 1), 9.0, 13.5);
-    Write(line, kMargin, 57, size, kFaintInk, "xml:space=\"preserve\"");
+    Write(line, kMargin, 57, fitting(TextWidth(line + " ", 1), 13.5), kFaintInk, "xml:space=\"preserve\"");
   }
 
   void PaintGrid() {

@@ -93,6 +93,7 @@ void ShadowTally::OnDecision(const RecordedDecision& recorded) {
     ++summary_.certified;
   else
     ++summary_.refused[std::string(CauseName(decision.cause))];
+  // The same id again: what was driven so far was driven under the decision before.
   if (decision.plan_id == driven_) EndPlan();
   obstacles_.Add(*recorded.basis.obstacles);
   if (const auto known = plans_.find(decision.plan_id); known != plans_.end()) {

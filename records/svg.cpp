@@ -15,11 +15,11 @@ using Eigen::Vector2d;
 constexpr double kTolerance = 0.005;
 constexpr int kGrid = 1 << 14;
 
+// To the chord itself: of a thin polygon the far end lies on the line through two corners before it.
 double DistanceToChord(const Vector2d& point, const Vector2d& from, const Vector2d& to) {
   const Vector2d chord = to - from;
-  const double length = chord.norm();
-  if (length == 0) return (point - from).norm();
-  return std::abs(chord.x() * (point - from).y() - chord.y() * (point - from).x()) / length;
+  const double square = chord.squaredNorm(), share = square > 0 ? chord.dot(point - from) / square : 0;
+  return (point - from - std::clamp(share, 0.0, 1.0) * chord).norm();
 }
 
 }  // namespace

@@ -138,6 +138,7 @@ Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles) {
       for (const bool is_occupied : map.occupied) cells += is_occupied ? '#' : '.';
       bytes.Text(cells);
     }
+    // A word before each: what one obstacle has and the next lacks is not taken for each other.
     if (!obstacle.name().empty()) {
       bytes.Text("named");
       bytes.Text(obstacle.name());

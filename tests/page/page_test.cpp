@@ -81,6 +81,11 @@ TEST(SvgTest, OutlineIsWithinItsTolerance) {
   }
 }
 
+TEST(SvgTest, AThinOutlineKeepsItsFarEnd) {
+  const Eigen::Vector2d far_end(10, 0.02);
+  EXPECT_THAT(Simplified({{0, 0}, far_end, {6, 0.03}, {1, 0.02}}, 0.1), Contains(far_end));
+}
+
 TEST(SvgTest, ShapesAreOnAGridOverTheFrame) {
   Svg svg(Eigen::AlignedBox2d(Eigen::Vector2d(0, 0), Eigen::Vector2d(16384, 16384)));
   svg.Polygon({{8192, 8192}, {8193.2, 8192}, {8192, 8195}}, "class=\"a\"");

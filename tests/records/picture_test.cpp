@@ -32,6 +32,17 @@ TEST(Picture, WritesSvgAndPng) {
   EXPECT_EQ(png[22] << 8 | png[23], 400);
 }
 
+TEST(Picture, ALongTitleIsWrittenSmaller) {
+  const ScratchDirectory scratch;
+  Picture picture = Sample();
+  DrawPicture(picture, scratch / "short.svg");
+  picture.title = std::string(120, 'm');
+  DrawPicture(picture, scratch / "long.svg");
+  const std::vector<std::uint8_t> small = ReadBytes(scratch / "short.svg"), large = ReadBytes(scratch / "long.svg");
+  EXPECT_THAT(std::string(small.begin(), small.end()), HasSubstr("font-size=\"19\""));
+  EXPECT_THAT(std::string(large.begin(), large.end()), HasSubstr("font-size=\"15.5"));
+}
+
 TEST(Picture, TheSameInputGivesTheSameBytes) {
   const ScratchDirectory scratch;
   DrawPicture(Sample(), scratch / "a.png");
