@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstring>
 #include <exception>
 #include <map>
 #include <span>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -38,6 +40,14 @@ static_assert(static_cast<int>(Cause::kPairwise) == 1 &&
               static_cast<int>(Cause::kBetween) == decision_t::CAUSE_BETWEEN &&
               static_cast<int>(Cause::kBound) == decision_t::CAUSE_BOUND);
 
+// Before a text that SetText has set, as SetText.
+template <std::size_t N>
+void Prepend(std::string_view text, std::uint8_t (&field)[N]) {
+  const std::size_t size = std::min(text.size(), N - 1);
+  std::memmove(field + size, field, N - 1 - size);
+  std::memcpy(field, text.data(), size);
+}
+
 std::optional<RobotMotion> MotionOf(const Config& config) {
   try {
     if (!config.laws.stop.empty()) return RobotMotion(config, Braking::kPlanned);
@@ -55,10 +65,10 @@ struct Gate::Again {
   Decision verdict;
 };
 
-// The last candidate that was certified.
+// The last candidate that was certified, and when.
 struct Gate::Rehearsal {
   std::vector<std::uint8_t> bytes;
-  Zonotope initial_set;
+  std::int64_t utime = 0;
 };
 
 Gate::Gate(const Config& config)
@@ -103,20 +113,27 @@ GateAnswer Gate::Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause
 
 GateAnswer Gate::Answer(Bytes message, const TimeSource& clock, std::optional<Rejection> from_outside) noexcept {
   const std::int64_t now_us = clock();
+  std::vector<std::uint8_t> chosen;
+  std::string how;
   try {
-    const auto batch = IsBatch(message) ? Decoded<candidate_batch_t>(message) : std::nullopt;
-    if (batch && WhyNoBatch(*batch).empty()) {
-      // A batch that is refused anyway is answered by its first candidate: nobody may have the gate certify hundreds of
-      // plans that it will not pass on.
-      const Choice chosen = from_outside ? Choice{} : Choose(*batch, now_us, clock);
-      GateAnswer answer = AnswerOne(Encode(CandidateOf(*batch, chosen.candidate)), now_us, clock, from_outside);
-      SetText(answer.decision.message, chosen.how + GetText(answer.decision.message));
-      return answer;
-    }
+    if (IsBatch(message)) std::tie(chosen, how) = ChooseIn(message, now_us, clock, from_outside.has_value());
   } catch (const std::exception& error) {
     from_outside = Rejection{decision_t::CAUSE_INTERNAL_ERROR, fmt::format("internal error: {}", WhyFailed(error))};
   }
-  return AnswerOne(message, now_us, clock, std::move(from_outside));
+  GateAnswer answer = AnswerOne(chosen.empty() ? message : Bytes(chosen), now_us, clock, std::move(from_outside));
+  if (!how.empty()) Prepend(how, answer.decision.message);
+  return answer;
+}
+
+// Apart, as RefuseBatch: a batch takes 62 kB of the stack, below which a single candidate would be decided on.
+std::pair<std::vector<std::uint8_t>, std::string> Gate::ChooseIn(Bytes message, std::int64_t now_us,
+                                                                 const TimeSource& clock, bool is_refused) {
+  const auto batch = Decoded<candidate_batch_t>(message);
+  if (!batch || !WhyNoBatch(*batch).empty()) return {};
+  // A batch that is refused anyway is answered by its first candidate: nobody may have the gate certify hundreds of
+  // plans that it will not pass on.
+  Choice choice = is_refused ? Choice{} : Choose(*batch, now_us, clock);
+  return {Encode(CandidateOf(*batch, choice.candidate)), std::move(choice.how)};
 }
 
 // Whatever it chooses is decided on by itself: this search proves nothing.
@@ -186,7 +203,7 @@ GateAnswer Gate::AnswerOne(Bytes bytes, std::int64_t now_us, const TimeSource& c
       DropIfLate(answer, clock());
       if (rehearsal_ && answer.certified) {
         rehearsal_->bytes.assign(bytes.begin(), bytes.end());
-        rehearsal_->initial_set.Assign(initial_set);
+        rehearsal_->utime = now_us;
       }
     }
   } catch (const std::exception& error) {
@@ -214,13 +231,15 @@ std::optional<Gate::Rejection> Gate::CheckBytes(Bytes bytes, Message& message) {
       fmt::format("{} bytes, must be {}", bytes.size(), EncodedSize<Message>())};
 }
 
+Gate::Rejection Gate::RefuseBatch(Bytes bytes) {
+  candidate_batch_t batch;
+  if (auto rejection = CheckBytes(bytes, batch)) return *std::move(rejection);
+  return {decision_t::CAUSE_WRONG_DIMENSION, fmt::format("batch: {}", WhyNoBatch(batch))};
+}
+
 std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candidate, Zonotope& initial_set,
                                            std::int64_t now_us) {
-  if (IsBatch(bytes)) {  // one that stands for candidates comes here by them
-    candidate_batch_t batch;
-    if (auto rejection = CheckBytes(bytes, batch)) return rejection;
-    return Rejection{decision_t::CAUSE_WRONG_DIMENSION, fmt::format("batch: {}", WhyNoBatch(batch))};
-  }
+  if (IsBatch(bytes)) return RefuseBatch(bytes);  // one that stands for candidates comes here by them
   if (auto rejection = CheckBytes(bytes, candidate)) return rejection;
   // Counted before it is judged: a gap is a loss also if what came is refused.
   sources_.Hear(candidate, now_us);
@@ -371,15 +390,22 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& uphel
 
 void Gate::KeepWarm() noexcept {
   if (!rehearsal_ || rehearsal_->bytes.empty()) return;
-  const auto& [bytes, initial_set] = *rehearsal_;
-  GateAnswer answer;  // where the next one will be, about: its memory counts, too
-  decision_t& decision = answer.decision;
-  SetDigest(decision.plan_digest, PlanDigest(bytes));
-  candidate_plan_t candidate;
-  if (Decode(Bytes(bytes), candidate) != DecodeStatus::kOk) return;
-  const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
-  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.indexed(), *tube_);
-  if (verdict.outcome == Outcome::kCertified) Attest(candidate, decision, answer.certified.emplace());
+  const auto& [bytes, now_us] = *rehearsal_;
+  try {
+    GateAnswer answer;  // where the next one will be, about: its memory counts, too
+    answer.decision.utime = now_us;
+    SetGrounds(answer.decision, grounds());
+    SetDigest(answer.decision.plan_digest, PlanDigest(bytes));
+    candidate_plan_t candidate{};
+    Zonotope initial_set;
+    if (CheckBytes(bytes, candidate) || CheckContent(candidate, initial_set) || CheckTimes(candidate, now_us)) return;
+    // By a clock that leaves no time for pieces.
+    Certify(
+        candidate, initial_set, [end = EarliestStart(now_us)] { return end; }, answer);
+    static_cast<void>(Encode(answer.decision));
+    if (answer.certified) static_cast<void>(Encode(*answer.certified));
+  } catch (const std::exception&) {  // nobody waits for it
+  }
 }
 
 std::optional<Gate::Again> Gate::CertifyAgain(const candidate_plan_t& candidate, const decision_t& decision) {

@@ -12,6 +12,7 @@ not, the caller calls Refuse. */
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "certifier/gate/obstacles_in_force.h"
@@ -122,9 +123,10 @@ class Gate final {
   /** Checks a stamp at this time (stamp.h). @return the error, or an empty text. */
   [[nodiscard]] std::string CheckFresh(std::int64_t utime, std::int64_t now_us) const;
 
-  /** With realtime.keep_warm: repeats what the last certificate took and drops it, so that the next decision finds its
-  code and data in the processor's caches. No later answer depends on it; tube() is that of this candidate. It allocates
-  nothing. Cost: less than a decision; nothing before the first certificate. */
+  /** With realtime.keep_warm: decides once more, from the bytes to the encoded messages, on the last candidate that was
+  certified, and drops the answer, so that the next decision finds its code and data in the processor's caches. No later
+  answer depends on it; tube() is that of this candidate. Cost: that of a decision; nothing before the first
+  certificate. */
   void KeepWarm() noexcept;
 
   /** As Certifier's. */
@@ -160,9 +162,14 @@ class Gate final {
                                   std::optional<Rejection> from_outside) noexcept;
   [[nodiscard]] GateAnswer AnswerOne(Bytes candidate, std::int64_t now_us, const TimeSource& clock,
                                      std::optional<Rejection> from_outside) noexcept;
+  /** The bytes of the candidate that is decided on, and what the decision's message begins with; nothing if the batch
+  stands for no candidates. */
+  [[nodiscard]] std::pair<std::vector<std::uint8_t>, std::string> ChooseIn(Bytes message, std::int64_t now_us,
+                                                                           const TimeSource& clock, bool is_refused);
   [[nodiscard]] Choice Choose(const candidate_batch_t& batch, std::int64_t now_us, const TimeSource& clock);
   template <class Message>
   [[nodiscard]] static std::optional<Rejection> CheckBytes(Bytes bytes, Message& message);
+  [[nodiscard]] static Rejection RefuseBatch(Bytes bytes);
   [[nodiscard]] std::optional<Rejection> Admit(Bytes bytes, candidate_plan_t& candidate, Zonotope& initial_set,
                                                std::int64_t now_us);
   [[nodiscard]] std::optional<Rejection> CheckContent(const candidate_plan_t& candidate, Zonotope& initial_set) const;

@@ -4,12 +4,10 @@
 #include <atomic>
 #include <cstddef>
 
-#include "certifier/gate/gate.h"
 #include "forereach/certify/batch.h"
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/pieces.h"
 #include "forereach/safety/obstacle_index.h"
-#include "tests/certifier/small_task.h"
 #include "tests/gap.h"
 #include "tests/sanitized.h"
 #include "tests/worlds.h"
@@ -93,16 +91,6 @@ TEST_F(Allocation, CertifyingInPiecesAllocatesNothing) {
   const Decision decision = pieces.Certify(*certifier_, plan, start, view, whole, Pieces::kMost, goes_on, tube_);
   EXPECT_EQ(allocations - before, 0);
   EXPECT_EQ(decision.outcome, Outcome::kCertified);
-}
-
-TEST_F(Allocation, KeepingAGateWarmAllocatesNothing) {
-  Config config = SmallTask();
-  config.realtime.keep_warm = true;
-  Gate gate(config);
-  ASSERT_TRUE(gate.Decide(Encode(Candidate(1)), kNow).certified);
-  const long before = allocations;
-  for (int i = 0; i < 3; ++i) gate.KeepWarm();
-  EXPECT_EQ(allocations - before, 0);
 }
 
 TEST_F(Allocation, TheCounterSeesAllocations) {
