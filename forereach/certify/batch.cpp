@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstring>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -94,6 +95,12 @@ std::vector<Index> Portions(std::span<const Plan> plans, std::span<const Index> 
   return begins;
 }
 
+// A thread's own. The tube is made by the thread: that takes as long as many plans.
+struct Worker {
+  const Plan* last = nullptr;  // that it judged
+  std::optional<Tube> own;
+};
+
 }  // namespace
 
 std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Plan> plans,
@@ -111,19 +118,20 @@ std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Pla
   const std::vector<Index> order = Gathered(plans, one_for_all);
   const std::vector<Index> begins = Portions(plans, order, one_for_all);
   const Index threads = std::clamp<Index>(begins.size() - 1, 1, options.threads);
-  std::vector<const Plan*> last(threads);  // that each thread judged
-  std::vector<Tube> own(options.tubes.empty() ? threads : 0);
-  const std::span<Tube> tubes = options.tubes.empty() ? std::span(own) : options.tubes;
+  std::vector<Worker> workers(threads);
   std::atomic<Index> certified = plans.size();  // the first one so far
   const auto is_over = [&] { return options.clock && options.clock() >= options.deadline; };
   const auto judge = [&](Index i, Index thread) {
-    const Plan* const before = std::exchange(last[thread], &plans[i]);
+    auto& [last, own] = workers[thread];
+    if (options.tubes.empty() && !own) own.emplace();
+    Tube& tube = own ? *own : options.tubes[thread];
+    const Plan* const before = std::exchange(last, &plans[i]);
     const int shared = one_for_all && before != nullptr ? SharedSteps(*before, plans[i]) : 0;
-    decisions[i] = certifier.Certify(plans[i], initial_sets[one_for_all ? 0 : i], obstacles, tubes[thread], shared);
+    decisions[i] = certifier.Certify(plans[i], initial_sets[one_for_all ? 0 : i], obstacles, tube, shared);
     if (decisions[i].outcome == Outcome::kCertified)
       for (Index known = certified; i < known && !certified.compare_exchange_weak(known, i);) {
       }
-    if (listener) listener(i, decisions[i], tubes[thread]);
+    if (listener) listener(i, decisions[i], tube);
   };
   ForEachInParallel(begins.size() - 1, options.threads, [&](Index portion, Index thread) {
     for (Index k = begins[portion]; k < begins[portion + 1]; ++k) {

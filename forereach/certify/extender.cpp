@@ -38,12 +38,12 @@ void Extender::Save(TubeNode& node) const {
   node.axes_ = slice.axes_in_slack();
   if (t > 0) node.found_ = tube_.step(t - 1).envelope.found;
   node.numbers_.resize((3 + ToSize(slice.num_generators())) * n);
-  auto to = node.numbers_.begin();
-  const auto put = [&](std::span<const double> numbers) { to = std::ranges::copy(numbers, to).out; };
-  put(slice.center());
-  put(tube_.half_width(t));
-  put({slice.slacks(), n});
-  for (int k = 0; k < slice.dim(); ++k) put(slice.row(k));
+  double* to = node.numbers_.data();
+  const auto put = [&](const double* from, std::size_t count) { to = std::copy_n(from, count, to); };
+  put(slice.centers(), n);
+  put(tube_.half_width(t).data(), n);
+  put(slice.slacks(), n);
+  for (int k = 0; k < slice.dim(); ++k) put(slice.row(k).data(), slice.row(k).size());
 }
 
 Decision Extender::Begin(const Zonotope& initial_set, TubeNode& root) {
