@@ -18,6 +18,7 @@
 #include "research/real/real.h"
 #include "research/regional.h"
 #include "research/run.h"
+#include "research/tightness.h"
 
 using namespace forereach::research;
 
@@ -124,6 +125,7 @@ int main(int argc, char** argv) {
        .options = {{"--drive", &drives, "",
                     "instead, drive it to goals: planner, certifier, guard and simulated robot; 20 seeds"}}});
   program.commands.push_back({.name = "regional", .purpose = "a bound on the residual for each region of the domain"});
+  program.commands.push_back({.name = "tightness", .purpose = "tubes over the inner bound; recall in pieces of X_0"});
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
 
   for (const Experiment& experiment : Experiments())
@@ -151,6 +153,8 @@ int main(int argc, char** argv) {
       RunPlans(plans, std::cout);
     } else if (name == "regional") {
       RunRegional({options.directory, quick, command}, std::cout);
+    } else if (name == "tightness") {
+      return RunTightness(quick, std::cout), 0;
     } else if (name == "drift") {
       if (drives)
         RunDriftDrives({options.directory, seeds.value_or(quick ? kQuickSeeds : 20), quick, command + " --drive"},
