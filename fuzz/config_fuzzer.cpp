@@ -1,5 +1,4 @@
 // Task files: any bytes are a task that the certifier can be made of, or refused with a ConfigError.
-#include "forereach/sets/zonotope.h"
 #include "fuzz/fuzz.h"
 #include "fuzz/text_mutator.h"
 #include "task/config.h"

@@ -19,7 +19,6 @@
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
-#include "forereach/sets/zonotope.h"
 #include "lcmtypes/grounds.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"

@@ -4,7 +4,6 @@
 #include <iterator>
 
 #include "forereach/numerics/size.h"
-#include "forereach/sets/zonotope.h"
 
 namespace forereach::verifier {
 namespace {

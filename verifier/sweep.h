@@ -19,7 +19,6 @@ finite bend is anywhere in its range over the slice's hull. */
 #include <Eigen/Core>
 
 #include "forereach/certify/problem.h"
-#include "forereach/sets/zonotope.h"
 #include "verifier/functions.h"
 #include "verifier/real.h"
 #include "verifier/tube.h"

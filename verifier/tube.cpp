@@ -8,7 +8,6 @@
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/size.h"
 #include "forereach/residual/growing_disturbance.h"
-#include "forereach/sets/zonotope.h"
 #include "verifier/affine.h"
 #include "verifier/functions.h"
 

@@ -4,7 +4,6 @@
 
 #include "forereach/dynamics/unbounded.h"
 #include "forereach/numerics/size.h"
-#include "forereach/sets/zonotope.h"
 #include "task/task_template.h"
 #include "tests/cli/program.h"
 #include "tests/task/task_files.h"

@@ -1,6 +1,6 @@
 // An index of obstacles leaves out nothing that is near, and changes no decision.
-#include "forereach/certify/tube.h"
 #include "forereach/safety/obstacle_index.h"
+#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 

@@ -1,6 +1,6 @@
 // A grid is the union of its occupied cells: to the last bit, and for each decision.
-#include "forereach/certify/tube.h"
 #include "forereach/safety/occupancy_grid.h"
+#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 

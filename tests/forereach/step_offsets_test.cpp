@@ -1,6 +1,6 @@
 // Which errors of steps a problem may declare, and what a step adds for them.
-#include "forereach/certify/tube.h"
 #include "forereach/reach/step_offsets.h"
+#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 

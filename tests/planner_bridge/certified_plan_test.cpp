@@ -1,5 +1,5 @@
-#include "forereach/certify/tube.h"
 #include "planner_bridge/certified_plan.h"
+#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 

@@ -1,6 +1,6 @@
 // What a picture shows of a body: a sweep contains the body at every sample that it spans, and predictions grow.
-#include "forereach/certify/tube.h"
 #include "records/outlines.h"
+#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 

@@ -1,6 +1,6 @@
 // One plan under one method: the certifier's own answers, and a coverage test that detects missing coverage.
-#include "forereach/certify/tube.h"
 #include "research/evaluate.h"
+#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 

@@ -1,5 +1,4 @@
 // What a good task file means.
-#include "forereach/sets/zonotope.h"
 #include "task/config.h"
 
 #include <regex>

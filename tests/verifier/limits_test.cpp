@@ -1,5 +1,4 @@
 // Limits of a task in certificates: kept by a hair, exceeded by a hair, and what the verifier cannot decide.
-#include "forereach/sets/zonotope.h"
 #include "tests/verifier/hand_made.h"
 
 namespace forereach::verifier::limits_test {

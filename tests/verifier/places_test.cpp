@@ -1,5 +1,4 @@
 // Bodies at expressions in certificates: clear by a hair, touching by a hair.
-#include "forereach/sets/zonotope.h"
 #include "tests/verifier/hand_made.h"
 
 namespace forereach::verifier::places_test {

@@ -1,5 +1,4 @@
 // Distances known by hand: exactly this distance is confirmed, one last bit more is not.
-#include "forereach/sets/zonotope.h"
 #include "tests/test.h"
 
 #include "forereach/safety/occupancy_grid.h"
