@@ -173,7 +173,7 @@ std::string WhyServerRefuses(const std::string& state) {
   return fmt::format("the server refuses, with its error {}", is_plain ? state : std::string("of no number"));
 }
 
-// A column's value as COPY takes it; several columns are a tuple.
+// A column's value as COPY takes it.
 using Field = std::optional<std::string>;
 Field FieldOf(std::int64_t value) { return std::to_string(value); }
 Field FieldOf(int value) { return std::to_string(value); }
@@ -189,27 +189,16 @@ template <class Number>
 Field FieldOf(OrNull<Number> value) {
   return value.number == -1 ? std::nullopt : FieldOf(value.number);
 }
-auto FieldOf(const std::array<std::string, kGrounds.size()>& values) {
-  return std::apply([](const auto&... each) { return std::tuple(FieldOf(each)...); }, values);
-}
-
-template <class Value>
-auto FieldsOf(const Value& value) {
-  if constexpr (std::is_same_v<decltype(FieldOf(value)), Field>)
-    return std::tuple(FieldOf(value));
-  else
-    return FieldOf(value);
-}
 
 // A run has the robot among its columns.
 template <class Row>
 auto RowFields(const std::string& robot, const Row& row) {
   const auto columns =
-      std::apply([](const auto&... each) { return std::tuple_cat(FieldsOf(each)...); }, ColumnsOf(row));
+      std::apply([](const auto&... column) { return std::tuple(FieldOf(column.value)...); }, ColumnsOf(row));
   if constexpr (std::is_same_v<Row, RunRow>)
     return columns;
   else
-    return std::tuple_cat(FieldsOf(robot), columns);
+    return std::tuple_cat(std::tuple(FieldOf(robot)), columns);
 }
 
 // Reads a row of a table's columns.
@@ -219,7 +208,7 @@ class RowReader final {
 
   void Read(auto& row) {
     auto columns = ColumnsOf(row);
-    std::apply([this](auto&... each) { (this->Next(each), ...); }, columns);
+    std::apply([this](auto&... column) { (this->Next(column.value), ...); }, columns);
   }
 
  private:
@@ -252,9 +241,6 @@ class RowReader final {
     } catch (const nlohmann::json::exception&) {
       throw StoreError("the store: a state in it is no list of numbers");
     }
-  }
-  void Next(std::array<std::string, kGrounds.size()>& values) {
-    for (std::string& value : values) Next(value);
   }
   void Next(std::optional<std::int64_t>& value) {
     const auto& text = Take();
@@ -452,10 +438,9 @@ std::vector<Row> Select(pqxx::work& work, const char* table, const std::string& 
 // Before the transaction of the rows, which would otherwise wait for others', and they for it.
 void Store::MakeMonths(Connection& connection, const Rows& rows) {
   std::set<int> months;
-  const auto note = [&months](const auto& all) {
-    for (const auto& row : all) months.insert(MonthOf(row.event.utime));
-  };
-  note(rows.decisions), note(rows.events), note(rows.gaps), note(rows.transitions);
+  Rows::ForEachTable([&](const char*, auto of_table) {
+    for (const auto& row : rows.*of_table) months.insert(MonthOf(row.event.utime));
+  });
   for (const int month : months) {
     if (month == 0 || months_.contains(month)) continue;
     pqxx::work work(connection.server);
@@ -472,10 +457,8 @@ std::int64_t Store::Write(const std::string& robot, const Rows& rows, const std:
     MakeMonths(connection, rows);
     pqxx::work work(connection.server);
     if (!connection.has_copies) work.exec(kCopies);
-    std::int64_t added = Add(work, "decisions", robot, rows.decisions);
-    added += Add(work, "execution_events", robot, rows.events);
-    added += Add(work, "gaps", robot, rows.gaps);
-    added += Add(work, "transitions", robot, rows.transitions);
+    std::int64_t added = 0;
+    Rows::ForEachTable([&](const char* table, auto of_table) { added += Add(work, table, robot, rows.*of_table); });
     Add(work, "run_states", robot, states);
     work.commit();
     connection.has_copies = true;
@@ -507,10 +490,11 @@ RowCounts Store::Count(const std::string& robot, const std::string& log_file) {
 Rows Store::Read(const std::string& robot, const std::string& log_file) {
   return With([&](Connection& connection) {
     pqxx::work work(connection.server);
-    return Rows{Select<DecisionRow>(work, "decisions", robot, log_file),
-                Select<EventRow>(work, "execution_events", robot, log_file),
-                Select<GapRow>(work, "gaps", robot, log_file),
-                Select<TransitionRow>(work, "transitions", robot, log_file)};
+    Rows rows;
+    Rows::ForEachTable([&]<class Row>(const char* table, std::vector<Row> Rows::*of_table) {
+      rows.*of_table = Select<Row>(work, table, robot, log_file);
+    });
+    return rows;
   });
 }
 

@@ -32,6 +32,21 @@ constexpr Dialect kDialect{.runs = "runs",
                            .unique = "UNIQUE",
                            .partitioned = ""};
 
+// What of the rows that are wanted, each once.
+std::string OfAllTables(const char* what, const char* where) {
+  std::string sql;
+  Rows::ForEachTable([&](const char* table, auto) {
+    sql += fmt::format("{}SELECT {} FROM {} WHERE {}", sql.empty() ? "" : " UNION ", what, table, where);
+  });
+  return sql;
+}
+
+// A gap need not have an event.
+template <class Row>
+constexpr const char* OrderOf() {
+  return std::is_same_v<Row, GapRow> ? "rowid" : "log_file, event_number";
+}
+
 // Why the last call failed.
 std::string WhySqlRefuses(sqlite3* handle) {
   const int code = handle ? sqlite3_errcode(handle) : SQLITE_NOMEM;
@@ -92,7 +107,7 @@ class Database::Statement final {
 
   void Read(auto& row) {
     auto columns = ColumnsOf(row);
-    std::apply([this](auto&... values) { (this->ReadNext(values), ...); }, columns);
+    std::apply([this](auto&... column) { (this->ReadNext(column.value), ...); }, columns);
   }
 
  private:
@@ -103,9 +118,6 @@ class Database::Statement final {
     sqlite3_bind_text(statement_, ++column_, value.data(), static_cast<int>(value.size()), SQLITE_TRANSIENT);
   }
   void BindNext(const std::vector<double>& value) { BindNext(JsonText(nlohmann::json(value))); }
-  void BindNext(const std::array<std::string, kGrounds.size()>& values) {
-    for (const std::string& value : values) BindNext(value);
-  }
   template <class Value>
   void BindNext(const std::optional<Value>& value) {
     if (value) return BindNext(*value);
@@ -127,9 +139,6 @@ class Database::Statement final {
   void ReadNext(std::string& value) {
     const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column_));
     value.assign(text ? text : "", static_cast<std::size_t>(sqlite3_column_bytes(statement_, column_++)));
-  }
-  void ReadNext(std::array<std::string, kGrounds.size()>& values) {
-    for (std::string& value : values) ReadNext(value);
   }
   void ReadNext(std::vector<double>& value) {
     std::string text;
@@ -168,15 +177,14 @@ Database::Database(const std::string& path) : path_(path), handle_(nullptr, &sql
     // Where the file system allows no write-ahead log SQLite keeps its rollback journal, which is as safe and slower.
     Execute("PRAGMA journal_mode = WAL");
     Execute(kLazily);
-    insert_decision_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO decisions VALUES
-      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
-      ON CONFLICT (log_file, event_number) DO NOTHING)sql");
-    insert_event_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO execution_events VALUES
-      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number) DO NOTHING)sql");
-    insert_gap_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO gaps VALUES
-      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number, reason) DO NOTHING)sql");
-    insert_transition_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO transitions VALUES
-      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number) DO NOTHING)sql");
+    Rows::ForEachTable([&]<class Row>(const char* table, std::vector<Row> Rows::*) {
+      std::string places = "?";
+      for (auto more = std::tuple_size_v<decltype(ColumnsOf(std::declval<Row&>()))>; more > 1; --more) places += ", ?";
+      inserts_.push_back(std::make_unique<Statement>(
+          handle,
+          fmt::format("INSERT INTO {} VALUES ({}) ON CONFLICT ({}) DO NOTHING", table, places, kDialect.KeyOf<Row>())
+              .c_str()));
+    });
     set_events_ = std::make_unique<Statement>(handle, "UPDATE runs SET events = ? WHERE log_file = ?");
     static_cast<void>(FindDisplaced());
   } catch (const DatabaseError& error) {
@@ -234,10 +242,11 @@ std::optional<int> Database::Write(const Rows& rows, const std::string& log_file
   int written = 0;
   try {
     Execute("BEGIN IMMEDIATE");
-    for (const DecisionRow& row : rows.decisions) written += Insert(*insert_decision_, row);
-    for (const EventRow& row : rows.events) written += Insert(*insert_event_, row);
-    for (const GapRow& row : rows.gaps) written += Insert(*insert_gap_, row);
-    for (const TransitionRow& row : rows.transitions) written += Insert(*insert_transition_, row);
+    auto insert = inserts_.begin();
+    Rows::ForEachTable([&](const char*, auto of_table) {
+      for (const auto& row : rows.*of_table) written += Insert(**insert, row);
+      ++insert;
+    });
     set_events_->Bind(events, log_file).Run();
     Execute("COMMIT");
     return written;
@@ -249,7 +258,7 @@ std::optional<int> Database::Write(const Rows& rows, const std::string& log_file
 }
 
 int Database::Insert(Statement& insert, const auto& row) {
-  return std::apply([&](const auto&... values) { return insert.Bind(values...).Run(); }, ColumnsOf(row));
+  return std::apply([&](const auto&... column) { return insert.Bind(column.value...).Run(); }, ColumnsOf(row));
 }
 
 template <class Row>
@@ -298,31 +307,22 @@ std::vector<RunRow> Database::Runs() {
 }
 
 Rows Database::ReadRange(const std::string& log_file, std::int64_t first, std::int64_t last) {
-  const auto sql = [](const char* table) {
-    return fmt::format("SELECT * FROM {} WHERE log_file = ? AND event_number BETWEEN ? AND ? ORDER BY event_number",
-                       table);
-  };
-  return {Select<DecisionRow>(sql("decisions").c_str(), log_file, first, last),
-          Select<EventRow>(sql("execution_events").c_str(), log_file, first, last),
-          Select<GapRow>(sql("gaps").c_str(), log_file, first, last),
-          Select<TransitionRow>(sql("transitions").c_str(), log_file, first, last)};
+  Rows rows;
+  Rows::ForEachTable([&]<class Row>(const char* table, std::vector<Row> Rows::*of_table) {
+    const std::string sql = fmt::format(
+        "SELECT * FROM {} WHERE log_file = ? AND event_number BETWEEN ? AND ? ORDER BY event_number", table);
+    rows.*of_table = Select<Row>(sql.c_str(), log_file, first, last);
+  });
+  return rows;
 }
 
 std::vector<std::int64_t> Database::EventBlocks(const std::string& log_file, std::int64_t size) {
-  return Select<std::int64_t>(R"sql(
-      SELECT DISTINCT event_number / ?2 AS block FROM decisions WHERE log_file = ?1
-      UNION SELECT DISTINCT event_number / ?2 FROM execution_events WHERE log_file = ?1
-      UNION SELECT DISTINCT event_number / ?2 FROM transitions WHERE log_file = ?1
-      UNION SELECT DISTINCT event_number / ?2 FROM gaps WHERE log_file = ?1 AND event_number IS NOT NULL
-      ORDER BY block)sql",
-                              log_file, size);
+  const std::string blocks = OfAllTables("event_number / ?2 AS block", "log_file = ?1 AND event_number IS NOT NULL");
+  return Select<std::int64_t>((blocks + " ORDER BY block").c_str(), log_file, size);
 }
 
 std::vector<std::string> Database::LogsWithoutRun() {
-  return Select<std::string>(R"sql(
-      SELECT log_file FROM (SELECT log_file FROM decisions UNION SELECT log_file FROM execution_events
-                            UNION SELECT log_file FROM gaps UNION SELECT log_file FROM transitions)
-      WHERE log_file NOT IN (SELECT log_file FROM runs))sql");
+  return Select<std::string>(OfAllTables("log_file", "log_file NOT IN (SELECT log_file FROM runs)").c_str());
 }
 
 std::set<std::string> Database::ConfigDigests(const std::string& log_file) {
@@ -347,20 +347,21 @@ std::map<std::string, std::int64_t> Database::LossesWithoutEvents(const std::str
 }
 
 Rows Database::Read(const std::string& log_file) {
-  return {Select<DecisionRow>("SELECT * FROM decisions WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number",
-                              log_file),
-          Select<EventRow>("SELECT * FROM execution_events WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number",
-                           log_file),
-          Select<GapRow>("SELECT * FROM gaps WHERE ?1 IN ('', log_file) ORDER BY rowid", log_file),
-          Select<TransitionRow>("SELECT * FROM transitions WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number",
-                                log_file)};
+  Rows rows;
+  Rows::ForEachTable([&]<class Row>(const char* table, std::vector<Row> Rows::*of_table) {
+    rows.*of_table = Select<Row>(
+        fmt::format("SELECT * FROM {} WHERE ?1 IN ('', log_file) ORDER BY {}", table, OrderOf<Row>()).c_str(),
+        log_file);
+  });
+  return rows;
 }
 
 void Database::ReadInBlocks(const std::string& log_file, const std::function<void(const Rows&)>& take) {
-  const auto read = [&](const char* sql, auto rows_of) {
-    Statement select(handle_.get(), sql);
+  Rows::ForEachTable([&]<class Row>(const char* table, std::vector<Row> Rows::*of_table) {
+    Statement select(handle_.get(),
+                     fmt::format("SELECT * FROM {} WHERE log_file = ? ORDER BY {}", table, OrderOf<Row>()).c_str());
     Rows block;
-    auto& rows = block.*rows_of;
+    std::vector<Row>& rows = block.*of_table;
     for (select.Bind(log_file); select.Step();) {
       select.Read(rows.emplace_back());
       if (rows.size() < kRowsInBlock) continue;
@@ -368,11 +369,7 @@ void Database::ReadInBlocks(const std::string& log_file, const std::function<voi
       rows.clear();
     }
     take(block);
-  };
-  read("SELECT * FROM decisions WHERE log_file = ? ORDER BY event_number", &Rows::decisions);
-  read("SELECT * FROM execution_events WHERE log_file = ? ORDER BY event_number", &Rows::events);
-  read("SELECT * FROM gaps WHERE log_file = ? ORDER BY rowid", &Rows::gaps);
-  read("SELECT * FROM transitions WHERE log_file = ? ORDER BY event_number", &Rows::transitions);
+  });
 }
 
 RowCounts Database::Count(const std::string& log_file) {

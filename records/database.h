@@ -124,7 +124,8 @@ class Database final {
   std::string path_, problem_;
   std::map<std::string, FileIdentity> files_;  // of the database, by the end of their names; as they were first seen
   std::unique_ptr<sqlite3, int (*)(sqlite3*)> handle_;
-  std::unique_ptr<Statement> insert_decision_, insert_event_, insert_gap_, insert_transition_, set_events_;
+  std::vector<std::unique_ptr<Statement>> inserts_;  // into each table
+  std::unique_ptr<Statement> set_events_;
 };
 
 }  // namespace forereach

@@ -19,8 +19,6 @@ namespace {
 
 constexpr int kInputs = 8;
 constexpr const char* kInputNames[kInputs] = {"u0", "u1", "u2", "u3", "u4", "u5", "u6", "u7"};
-constexpr const char* kGroundNames[] = {"config_digest", "model_digest", "declaration_digest", "observations_digest",
-                                        "obstacles_digest"};
 
 // Numbers that count from 0, and are -1 where none applies.
 Cell Index(std::int64_t value) { return value < 0 ? Cell() : Cell(value); }
@@ -32,21 +30,32 @@ Cells ReferenceOf(const std::string& robot, const LogReference& event) {
   return {{"robot", robot}, {"log_file", event.log_file}, {"event_number", Index(event.event_number)}};
 }
 
-void AddCandidate(Cells& cells, const candidate_plan_t* candidate) {
+bool IsNamed(const Cells::value_type& cell, std::string_view name) { return cell.first == name; }
+
+// All of a row but the event's time.
+Cells ExportedColumns(const std::string& robot, const auto& row) {
+  Cells cells = CellsOfColumns(row);
+  cells.insert(cells.begin(), {"robot", robot});
+  std::erase_if(cells, [](const auto& cell) { return IsNamed(cell, "event_utime"); });
+  cells.back().second = TextOrNone(row.event.digest);
+  return cells;
+}
+
+Cells CandidateCells(const candidate_plan_t* candidate) {
   const auto number = [&](std::int64_t value) { return candidate ? Cell(value) : Cell(); };
   const auto numbers = [&](const double(&values)[16]) {
     return candidate && HasCounts(*candidate) ? Cell(std::vector(values, values + candidate->num_states)) : Cell();
   };
   static const candidate_plan_t none{};
   const candidate_plan_t& given = candidate ? *candidate : none;
-  Add(cells, {{"start_utime", number(given.start_utime)},
-              {"step_us", number(given.step_us)},
-              {"num_states", number(given.num_states)},
-              {"num_inputs", number(given.num_inputs)},
-              {"num_steps", number(given.num_steps)},
-              {"progress_steps", number(given.progress_steps)},
-              {"initial_center", numbers(given.initial_center)},
-              {"initial_half_width", numbers(given.initial_half_width)}});
+  return {{"start_utime", number(given.start_utime)},
+          {"step_us", number(given.step_us)},
+          {"num_states", number(given.num_states)},
+          {"num_inputs", number(given.num_inputs)},
+          {"num_steps", number(given.num_steps)},
+          {"progress_steps", number(given.progress_steps)},
+          {"initial_center", numbers(given.initial_center)},
+          {"initial_half_width", numbers(given.initial_half_width)}};
 }
 
 // What a text of a recording may not begin with in a spreadsheet: it would be computed.
@@ -93,28 +102,10 @@ bool HasCounts(const candidate_plan_t& candidate) {
 }
 
 Cells CellsOf(const std::string& robot, const DecisionRow& row, const candidate_plan_t* candidate) {
-  Cells cells = ReferenceOf(robot, row.event);
-  Add(cells, {{"utime", row.utime},
-              {"candidate_utime", row.candidate_utime},
-              {"sequence", row.sequence},
-              {"source", row.source},
-              {"plan_id", row.plan_id},
-              {"outcome", row.outcome},
-              {"cause", row.cause},
-              {"step", Index(row.step)},
-              {"coordinate", Index(row.coordinate)},
-              {"obstacle", Index(row.obstacle)},
-              {"first_observation", Index(row.first_observation)},
-              {"second_observation", Index(row.second_observation)},
-              {"margin", row.margin},
-              {"threshold", row.threshold},
-              {"elapsed_us", row.elapsed_us},
-              {"latency_us", row.latency_us},
-              {"shadow", Index(row.shadow)}});
-  AddCandidate(cells, candidate);
-  Add(cells, {{"message", row.message}, {"plan_digest", row.plan_digest}});
-  for (std::size_t i = 0; i < row.grounds.size(); ++i) cells.emplace_back(kGroundNames[i], row.grounds[i]);
-  cells.emplace_back("event_digest", TextOrNone(row.event.digest));
+  Cells cells = ExportedColumns(robot, row);
+  Cells added = CandidateCells(candidate);
+  cells.insert(std::ranges::find_if(cells, [](const auto& cell) { return IsNamed(cell, "message"); }),
+               std::make_move_iterator(added.begin()), std::make_move_iterator(added.end()));
   return cells;
 }
 
@@ -146,36 +137,17 @@ Cells CellsOf(const std::string& robot, const withdrawal_t& withdrawal, const Lo
               {"certificate_digest", ToHex(GetDigest(withdrawal.certificate_digest))}});
   const Grounds grounds = GroundsOf(withdrawal);
   for (std::size_t i = 0; i < kGrounds.size(); ++i)
-    cells.emplace_back(kGroundNames[i], ToHex(grounds.*kGrounds[i].member));
+    cells.emplace_back(kGroundColumns[i], ToHex(grounds.*kGrounds[i].member));
   cells.emplace_back("event_digest", TextOrNone(event.digest));
   return cells;
 }
 
-Cells CellsOf(const std::string& robot, const EventRow& row) {
-  Cells cells = ReferenceOf(robot, row.event);
-  Add(cells, {{"utime", row.utime},
-              {"sequence", row.sequence},
-              {"plan_id", Index(row.plan_id)},
-              {"kind", row.kind},
-              {"step", Index(row.step)},
-              {"coordinate", Index(row.coordinate)},
-              {"state", row.state},
-              {"value", row.value},
-              {"message", row.message},
-              {"event_digest", TextOrNone(row.event.digest)}});
-  return cells;
-}
+Cells CellsOf(const std::string& robot, const EventRow& row) { return ExportedColumns(robot, row); }
 
 Cells CellsOf(const std::string& robot, const GapRow& row) {
-  Cells cells = ReferenceOf(robot, row.event);
-  Add(cells, {{"channel", row.channel},
-              {"source", TextOrNone(row.source)},
-              {"expected", Index(row.expected)},
-              {"got", Index(row.got)},
-              {"lost", row.lost},
-              {"utime", row.utime},
-              {"reason", row.reason},
-              {"event_digest", TextOrNone(row.event.digest)}});
+  Cells cells = ExportedColumns(robot, row);
+  for (auto& cell : cells)
+    if (IsNamed(cell, "source")) cell.second = TextOrNone(row.source);
   return cells;
 }
 

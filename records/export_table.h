@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "records/rows.h"
+#include "records/schema.h"
 
 namespace forereach {
 
@@ -21,6 +23,20 @@ namespace forereach {
 /** A value of a record. None: it does not apply. */
 using Cell = std::variant<std::monostate, std::int64_t, double, std::string, std::vector<double>>;
 using Cells = std::vector<std::pair<const char*, Cell>>;
+
+/** What each column of a row has, in the order of its table. */
+[[nodiscard]] Cells CellsOfColumns(const auto& row) {
+  const auto cell_of = [](const auto& value) -> Cell {
+    if constexpr (requires { value.number; })
+      return value.number < 0 ? Cell() : Cell(value.number);
+    else
+      return value;
+  };
+  Cells cells;
+  std::apply([&](const auto&... column) { (cells.emplace_back(column.name, cell_of(column.value)), ...); },
+             ColumnsOf(row));
+  return cells;
+}
 
 /** @param robot whose log it is (records/run_logs.h). @param candidate null if it is not known. */
 [[nodiscard]] Cells CellsOf(const std::string& robot, const DecisionRow& row, const candidate_plan_t* candidate);

@@ -11,18 +11,6 @@
 namespace forereach {
 namespace {
 
-Cells ExportedCells(const DecisionRow& row) { return CellsOf("", row, nullptr); }
-Cells ExportedCells(const TransitionRow& row) {
-  return {{"utime", row.utime}, {"sequence", row.sequence},     {"duration_us", row.duration_us},  {"state", row.state},
-          {"input", row.input}, {"next_state", row.next_state}, {"event_digest", row.event.digest}};
-}
-Cells ExportedCells(const auto& row) { return CellsOf("", row); }
-Cells CellsOfRow(const auto& row) {
-  Cells cells = ExportedCells(row);
-  cells.emplace_back("event_utime", row.event.utime);
-  return cells;
-}
-
 std::string DescribeCell(const Cells::value_type& cell) {
   std::string text = CsvLine(Cells{cell});
   text.pop_back();
@@ -66,8 +54,9 @@ void RowComparison::Compare(Table& table, const std::vector<Row>& derived, const
       table.unrecorded.insert(event);
       continue;
     }
-    Difference difference{DescribeDifference(CellsOfRow(*found), CellsOfRow(row)),
-                          DescribeDifference(CellsOfRow(*found), CellsOfRow(Adjusted(row, *found)))};
+    const Cells known = CellsOfColumns(*found);
+    Difference difference{DescribeDifference(known, CellsOfColumns(row)),
+                          DescribeDifference(known, CellsOfColumns(Adjusted(row, *found)))};
     if (grounds_.misses_candidates) difference.known_order = difference.unknown_order;
     if (!difference.known_order.empty()) table.differences.emplace(event, std::move(difference));
   }

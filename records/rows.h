@@ -80,6 +80,14 @@ struct Rows {
   std::vector<GapRow> gaps;
   std::vector<TransitionRow> transitions;
 
+  /** Calls visit(its name, the member with its rows) for each table. */
+  static void ForEachTable(const auto& visit) {
+    visit("decisions", &Rows::decisions);
+    visit("execution_events", &Rows::events);
+    visit("gaps", &Rows::gaps);
+    visit("transitions", &Rows::transitions);
+  }
+
   [[nodiscard]] std::size_t size() const { return decisions.size() + events.size() + gaps.size() + transitions.size(); }
   [[nodiscard]] bool empty() const { return size() == 0; }
 };

@@ -33,7 +33,7 @@ inline std::vector<std::string> TextsOf(const Rows& rows) {
   const auto add = [&texts](const char* table, const auto& all) {
     for (const auto& row : all) {
       std::string& text = texts.emplace_back(table);
-      std::apply([&text](const auto&... values) { ((text += "|" + TextOf(values)), ...); }, ColumnsOf(row));
+      std::apply([&text](const auto&... column) { ((text += "|" + TextOf(column.value)), ...); }, ColumnsOf(row));
     }
   };
   add("decision", rows.decisions);
