@@ -4,6 +4,7 @@
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/compiled_models.h"
 #include "forereach/dynamics/equations_header.h"
 #include "forereach/dynamics/models/kinematic_bicycle.h"
