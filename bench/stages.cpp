@@ -121,16 +121,6 @@ void RunReduction(State& state, const Midway& midway) {
   }
 }
 
-void RunSeparationByHulls(State& state, const Midway& midway) {
-  const Projection projection(midway.task.problem->projection, midway.slice.dim());
-  const std::span<const double> half_width(midway.half_width.data(), static_cast<std::size_t>(midway.slice.dim()));
-  for (auto _ : state) {
-    Hull hull;
-    projection.EncloseHull(midway.slice, half_width, hull);
-    benchmark::DoNotOptimize(SeparateHulls(hull, midway.task.obstacles.front()));
-  }
-}
-
 void RunSeparation(State& state, const Midway& midway) {
   Zonotope projected;
   const std::span<const double> half_width(midway.half_width.data(), static_cast<std::size_t>(midway.slice.dim()));
@@ -149,6 +139,7 @@ void RunExtension(State& state, const Midway& midway) {
     proven = extender.Extend(node, midway.task.plan().input(t), node).outcome == Outcome::kNone;
   if (!proven) return state.SkipWithError("not the task's tube");
   for (auto _ : state) benchmark::DoNotOptimize(extender.Extend(node, midway.input(), next));
+  state.counters["bytes"] = static_cast<double>(next.bytes());
 }
 
 using Run = void (*)(State&, const Midway&);
@@ -206,7 +197,6 @@ void RegisterStages(int observations) {
   if (observations != 400) return;  // the others do not look at observations
   Register("expansion", Scenario::kBicycle, observations, RunExpand);
   Register("reduction", Scenario::kBicycle, observations, RunReduction);
-  Register("separation_by_hulls", Scenario::kBicycle, observations, RunSeparationByHulls);
   Register("separation_exact", Scenario::kBicycle, observations, RunSeparation);
 }
 
