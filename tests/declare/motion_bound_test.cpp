@@ -381,7 +381,7 @@ TEST_F(TwoLinkArm, TheBoundOfItsHandIsThatOfTheMotionsItHas) {
   const auto flow = MakeFlow(*Model(), body.Coordinates());
   const Domain domain = DomainOfTheArm(0.2, 2);
   const MotionBounds bounds =
-      BoundMotion({*flow, domain, kPeriod, Eigen::MatrixXd::Zero(2, 4), -1, Rest()}, {.gap = 0.25});
+      BoundMotion({*flow, domain, kPeriod, Eigen::MatrixXd::Zero(2, 4), -1, Rest()}, {.gap = 0.1});
   const auto largest = Largest(domain, AccelerationOfTheHand, random_);
   for (std::size_t k = 0; k < 2; ++k) {
     EXPECT_TRUE(bounds.acceleration[k].reached) << bounds.acceleration[k].boxes;

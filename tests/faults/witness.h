@@ -20,6 +20,7 @@
 #include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "bus/bus_options.h"
 
 namespace forereach {
 
