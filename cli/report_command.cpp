@@ -94,9 +94,9 @@ PageRun GatherRuns(const ReportArguments& options, const std::vector<std::string
   std::vector<std::unique_ptr<PageRead>> read(named.runs.size());
   std::mutex mutex;
   const RunLogs* first = named.runs.data();
-  static_cast<void>(ForEachRun<bool>(named, options.jobs, "read", [&](const RunLogs& run, RunWork&) {
+  static_cast<void>(ForEachRun<bool>(named, options.jobs, "read", [&](const RunLogs& run, RunWork& work) {
     auto of_run = std::make_unique<PageRead>(bounds);
-    ReadPass(run, tasks, bounds, *of_run);
+    ReadPass(run, tasks, bounds, work.threads, *of_run);
     const std::lock_guard lock(mutex);
     read[static_cast<std::size_t>(&run - first)] = std::move(of_run);
     if (named.is_many) KeepLast(read, bounds);

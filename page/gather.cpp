@@ -192,11 +192,12 @@ void AddTasks(const LogTasks& tasks, PageRun& run) {
 }
 
 // @param makes_rows false: they are known already.
-void ReadLogs(const Logs& logs, LogTasks tasks, bool makes_rows, const PageBounds& bounds, PagePass& pass) {
+void ReadLogs(const Logs& logs, LogTasks tasks, bool makes_rows, const PageBounds& bounds, unsigned threads,
+              PagePass& pass) {
   if (!tasks.has_decisions() && !makes_rows) return;
   PageRun& run = pass.rows;
   RowReader reader(tasks.first().bus, makes_rows, bounds, run);
-  ShadowTally shadow(1);
+  ShadowTally shadow(threads);
   std::vector<TimelineUser*> users{&reader, &pass.cases, &shadow};
   users.insert(users.end(), pass.others.begin(), pass.others.end());
   Timeline timeline(tasks, users);
@@ -294,12 +295,12 @@ void LastCases::OnEvent(const LogEvent& event) {
     entry.executed.push_back({state->executing_step, at.x(), at.y()});
 }
 
-void ReadPass(const RunLogs& run, const PageTasks& tasks, const PageBounds& bounds, PagePass& pass) {
+void ReadPass(const RunLogs& run, const PageTasks& tasks, const PageBounds& bounds, unsigned threads, PagePass& pass) {
   PageRun& page = pass.rows;
   const bool has_database = !run.database.empty();
   if (has_database) ReadDatabase(run, bounds, page);
   try {
-    if (!run.logs.empty()) ReadLogs(run.logs, tasks.of_run.Of(run.logs), !has_database, bounds, pass);
+    if (!run.logs.empty()) ReadLogs(run.logs, tasks.of_run.Of(run.logs), !has_database, bounds, threads, pass);
   } catch (const BadInput& error) {
     if (!has_database) throw;
     page.notes.push_back(fmt::format("No tubes, faults and withdrawals: {}", error.what()));

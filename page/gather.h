@@ -76,8 +76,9 @@ struct PagePass {
 
 /** Reads the rows of one run, without drawings, and its cases. Rows of a database need no log; faults and withdrawals
 come from the logs beside it, and what keeps these from being read is a note. Cost: the logs are read once.
+@param threads that certify a shadow's plans again.
 @throws BadInput if a run without a database cannot be read. */
-void ReadPass(const RunLogs& run, const PageTasks& tasks, const PageBounds& bounds, PagePass& pass);
+void ReadPass(const RunLogs& run, const PageTasks& tasks, const PageBounds& bounds, unsigned threads, PagePass& pass);
 
 /** Forgets what a page of all these runs has no room for. @param passes may be null. */
 void KeepLast(const std::vector<PagePass*>& passes, const PageBounds& bounds);

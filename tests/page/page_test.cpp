@@ -25,7 +25,7 @@ PageRun GatherPage(const std::vector<std::string>& inputs, const std::string& co
   std::deque<PagePass> passes;
   std::vector<PagePass*> all;
   for (const RunLogs& run : named.runs) try {
-      ReadPass(run, tasks, bounds, passes.emplace_back(bounds));
+      ReadPass(run, tasks, bounds, 2, passes.emplace_back(bounds));
       all.push_back(&passes.back());
       if (named.is_many) KeepLast(all, bounds);
     } catch (const BadInput& error) {
