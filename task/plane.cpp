@@ -31,8 +31,33 @@ bool IsBetween(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c) {
          c.y <= std::max(a.y, b.y);
 }
 
-bool IsOn(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c) {
-  return IsBetween(a, b, c) && Turn(a, b, c) == 0;
+// Where c, on the line through a and b, lies on it: 0 at a, 1 at b.
+mpq_class ShareOf(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c) {
+  if (a.x != b.x) return (mpq_class(c.x) - mpq_class(a.x)) / (mpq_class(b.x) - mpq_class(a.x));
+  return (mpq_class(c.y) - mpq_class(a.y)) / (mpq_class(b.y) - mpq_class(a.y));
+}
+
+// The same of the point where the line through c and d, which is not parallel, crosses it.
+mpq_class ShareAt(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c, const PlanePoint& d) {
+  const mpq_class ax(a.x), ay(a.y), x = mpq_class(d.x) - mpq_class(c.x), y = mpq_class(d.y) - mpq_class(c.y);
+  return ((mpq_class(c.x) - ax) * y - (mpq_class(c.y) - ay) * x) /
+         ((mpq_class(b.x) - ax) * y - (mpq_class(b.y) - ay) * x);
+}
+
+// Whether the point at this share of the segment from a to b is strictly inside the ring.
+bool IsInside(const PlanePoint& a, const PlanePoint& b, const mpq_class& share, const Ring& ring) {
+  const mpq_class ax(a.x), ay(a.y), x = ax + share * (mpq_class(b.x) - ax), y = ay + share * (mpq_class(b.y) - ay);
+  bool is_inside = false;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const PlanePoint &c = ring[i], &d = ring[(i + 1) % ring.size()];
+    if (std::min(c.y, d.y) > y || std::max(c.y, d.y) < y) continue;
+    const mpq_class cx(c.x), cy(c.y), dx(d.x), dy(d.y);
+    const mpq_class turn = (dx - cx) * (y - cy) - (dy - cy) * (x - cx);
+    if (turn == 0 && std::min(c.x, d.x) <= x && std::max(c.x, d.x) >= x) return false;
+    // A ray from the point to the right.
+    if ((cy > y) != (dy > y) && (turn > 0) == (dy > cy)) is_inside = !is_inside;
+  }
+  return is_inside;
 }
 
 [[noreturn]] void Refuse(const std::string& what) { throw NoPolygon(what); }
@@ -307,26 +332,36 @@ bool Meet(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c, const P
          (at_b == 0 && IsBetween(c, d, b));
 }
 
-bool IsInside(const PlanePoint& a, const PlanePoint& b, const Ring& ring) {
-  // No side crosses the segment, no corner lies inside it, and the ring winds around its middle.
-  const mpq_class x = (mpq_class(a.x) + mpq_class(b.x)) / 2, y = (mpq_class(a.y) + mpq_class(b.y)) / 2;
-  bool is_inside = false;
-  for (std::size_t i = 0; i < ring.size(); ++i) {
-    const PlanePoint &c = ring[i], &d = ring[(i + 1) % ring.size()];
-    if (!(c == a) && !(c == b) && IsOn(a, b, c)) return false;
-    const int at_c = Turn(a, b, c), at_d = Turn(a, b, d);
-    if (at_c == 0 && at_d == 0 && IsBetween(c, d, a) && IsBetween(c, d, b)) return false;
-    if (at_c * at_d < 0 && Turn(c, d, a) * Turn(c, d, b) < 0) return false;
-    // A ray from the middle to the right.
-    if (std::min(c.y, d.y) > std::max(a.y, b.y) || std::max(c.y, d.y) < std::min(a.y, b.y)) continue;
-    const mpq_class cx(c.x), cy(c.y), dx(d.x), dy(d.y);
-    if ((cy > y) != (dy > y)) {
-      const mpq_class turn = (dx - cx) * (y - cy) - (dy - cy) * (x - cx);
-      if (turn == 0) return false;
-      if ((turn > 0) == (dy > cy)) is_inside = !is_inside;
+std::vector<std::pair<double, double>> SharesOutside(const PlanePoint& a, const PlanePoint& b,
+                                                     const std::vector<const Ring*>& rings) {
+  constexpr std::size_t kMostCuts = 100;
+  std::vector<std::pair<mpq_class, mpq_class>> inside;
+  for (const Ring* const ring : rings) {
+    // Between two cuts the segment does not meet the ring, or it lies along a side: its middle tells for all of it.
+    std::vector<mpq_class> cuts{0, 1};
+    for (std::size_t i = 0; i < ring->size() && cuts.size() <= kMostCuts; ++i) {
+      const PlanePoint &c = (*ring)[i], &d = (*ring)[(i + 1) % ring->size()];
+      const int at_c = Turn(a, b, c);
+      if (at_c != 0 && at_c * Turn(a, b, d) >= 0) continue;
+      mpq_class share = at_c == 0 ? ShareOf(a, b, c) : ShareAt(a, b, c, d);
+      if (share > 0 && share < 1) cuts.push_back(std::move(share));
     }
+    if (cuts.size() > kMostCuts) continue;
+    std::sort(cuts.begin(), cuts.end());
+    for (std::size_t i = 0; i + 1 < cuts.size(); ++i)
+      if (cuts[i] < cuts[i + 1] && IsInside(a, b, (cuts[i] + cuts[i + 1]) / 2, *ring))
+        inside.emplace_back(cuts[i], cuts[i + 1]);
   }
-  return is_inside;
+  std::sort(inside.begin(), inside.end(), [](const auto& p, const auto& q) { return p.first < q.first; });
+  std::vector<std::pair<double, double>> outside;
+  mpq_class end = 0;
+  inside.emplace_back(1, 1);
+  for (const auto& [from, until] : inside) {
+    // get_d rounds towards zero.
+    if (end < from) outside.emplace_back(end.get_d(), from == from.get_d() ? from.get_d() : NextUp(from.get_d()));
+    if (end < until) end = until;
+  }
+  return outside;
 }
 
 std::string ToText(const PlanePoint& point) { return fmt::format("({}, {})", ToText(point.x), ToText(point.y)); }

@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace forereach {
@@ -62,9 +63,11 @@ corners than kMaxAreaCorners. */
 /** Whether two closed segments have a point in common. Exact. */
 [[nodiscard]] bool Meet(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c, const PlanePoint& d);
 
-/** Whether the segment from a to b lies in the ring's polygon and its middle strictly inside. Exact; false where the
-ring crosses itself is not promised, so check such rings before. @pre a != b. */
-[[nodiscard]] bool IsInside(const PlanePoint& a, const PlanePoint& b, const Ring& ring);
+/** The parts of the segment from a to b that lie strictly inside no ring (a point is inside if a ray from it meets the
+ring an odd number of times), but for single points, as shares of it from 0 to 1, ascending. Decided exactly; each part
+is rounded outward. A ring that meets the segment more than 100 times counts as if it were not there. @pre a != b. */
+[[nodiscard]] std::vector<std::pair<double, double>> SharesOutside(const PlanePoint& a, const PlanePoint& b,
+                                                                   const std::vector<const Ring*>& rings);
 
 /** "(1.5, 2)" */
 [[nodiscard]] std::string ToText(const PlanePoint& point);

@@ -394,14 +394,24 @@ class RoadReader {
     return lanelet;
   }
 
-  // Whether another lanelet has the road on both sides of the segment.
-  [[nodiscard]] bool IsOnTheRoad(const Lanelet& own, const PlanePoint& a, const PlanePoint& b) const {
-    return std::ranges::any_of(lanelets_, [&](const Lanelet& other) {
-      const auto has = [&](const PlanePoint& p) {
-        return other.lower.x <= p.x && p.x <= other.upper.x && other.lower.y <= p.y && p.y <= other.upper.y;
-      };
-      return &other != &own && has(a) && has(b) && IsInside(a, b, other.area);
-    });
+  // The parts of the segment where no other lanelet has the road on both sides. An end that is none of the segment's is
+  // rounded, and the part grown by that.
+  [[nodiscard]] std::vector<Ring> OffTheRoad(const Lanelet& own, const PlanePoint& a, const PlanePoint& b) const {
+    std::vector<const Ring*> areas;
+    for (const Lanelet& other : lanelets_)
+      if (&other != &own && other.lower.x <= std::max(a.x, b.x) && std::min(a.x, b.x) <= other.upper.x &&
+          other.lower.y <= std::max(a.y, b.y) && std::min(a.y, b.y) <= other.upper.y)
+        areas.push_back(&other.area);
+    std::vector<Ring> parts;
+    const double rounding = 0x1p-48 * (std::abs(a.x) + std::abs(a.y) + std::abs(b.x) + std::abs(b.y));
+    const auto at = [&](double share) {
+      return share == 0 ? a : share == 1 ? b : PlanePoint{a.x + share * (b.x - a.x), a.y + share * (b.y - a.y)};
+    };
+    for (const auto& part : SharesOutside(a, b, areas)) {
+      const Ring ends{at(part.first), at(part.second)};
+      parts.push_back(ends == Ring{a, b} ? ends : Grown(ends, rounding));
+    }
+    return parts;
   }
 
   // Whether the segment lies along the neighbour, which the file may lack.
@@ -432,9 +442,11 @@ class RoadReader {
     for (std::size_t i = 0; i + 1 < bound.size(); ++i) {
       if (bound[i] == bound[i + 1]) continue;
       const bool is_beside = IsBeside(own, neighbour, bound[i], bound[i + 1]);
-      if (is_beside || IsOnTheRoad(own, bound[i], bound[i + 1])) {
+      const std::vector<Ring> parts = is_beside ? std::vector<Ring>() : OffTheRoad(own, bound[i], bound[i + 1]);
+      if (parts != std::vector<Ring>{Ring{bound[i], bound[i + 1]}}) {
         inside_ += is_beside ? 0 : 1;
         if (run.size() > 1) world_.Add(name, run);
+        for (const Ring& part : parts) world_.Add(name, part);
         run = {bound[i + 1]};
         continue;
       }
@@ -506,8 +518,8 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
   world.notes.insert(world.notes.begin(), text + ".");
   world.notes.push_back(fmt::format(
       "The boundary: bounds of lanelets where no neighbour is within {} m; {} segments inside another lanelet are left "
-      "out. "
-      "Lanelets have open ends, and a change to a neighbour's lane in the other direction is allowed.",
+      "out as far as they are. Lanelets have open ends, and a change to a neighbour's lane in the other direction is "
+      "allowed.",
       CommonRoadOptions::kBeside, road.inside()));
   if (obstacles.without_orientation() > 0)
     world.notes.push_back(

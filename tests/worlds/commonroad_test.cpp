@@ -114,6 +114,20 @@ TEST_F(CommonRoadTest, ACrossingIsOpen) {
   EXPECT_THAT(world.notes, Contains(HasSubstr("4 segments inside another lanelet")));
 }
 
+// A straight road of two points a side, and a side road that turns into it: what lies in the turn is road.
+TEST_F(CommonRoadTest, ABoundIsOpenAsFarAsAnotherLaneletGoes) {
+  const World world = Scenario(Lanelet(1, {{-20, 2}, {20, 2}}, {{-20, -2}, {20, -2}}) +
+                               Lanelet(2, {{-3, 9}, {-3, 0}}, {{4, 9}, {4, 0}}));
+  EXPECT_FALSE(Contains(world, At(-2.9, 2)) || Contains(world, At(0, 2)) || Contains(world, At(3.9, 2)));
+  for (const double x : {-20.0, -10.0, -3.0, 4.0, 20.0}) EXPECT_TRUE(Contains(world, At(x, 2))) << x;
+  for (const double x : {-20.0, 0.0, 3.0, 20.0}) EXPECT_TRUE(Contains(world, At(x, -2))) << x;
+  for (const double x : {-3.0, 4.0}) {
+    EXPECT_TRUE(Contains(world, At(x, 9)) && Contains(world, At(x, 2))) << x;
+    EXPECT_FALSE(Contains(world, At(x, 1.9)) || Contains(world, At(x, 0.1))) << x;
+  }
+  EXPECT_THAT(world.notes, Contains(HasSubstr("3 segments inside another lanelet")));
+}
+
 TEST_F(CommonRoadTest, WhatStandsIsItsShapeAtItsState) {
   const World world = Scenario(std::string("<staticObstacle id=\"3\"><type>car</type>") + kCar +
                                State("initialState", 10, 5, std::numbers::pi / 2, 0) + "</staticObstacle>");

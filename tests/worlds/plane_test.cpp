@@ -107,7 +107,7 @@ TEST(ConvexPieces, WhatIsNoAreaIsRefusedWithThePlace) {
 TEST(Grown, ContainsAllWithinTheMargin) {
   FreshRandom random;
   std::normal_distribution<double> any;
-  for (int round = 0; round < 200; ++round) {
+  for (int round = 0; round < 60; ++round) {
     const std::vector<PlanePoint> points{
         {any(random), any(random)}, {any(random), any(random)}, {any(random), any(random)}};
     const double margin = std::abs(any(random)) * (round % 2 == 0 ? 1e-14 : 1);
@@ -120,17 +120,66 @@ TEST(Grown, ContainsAllWithinTheMargin) {
   }
 }
 
-TEST(IsInside, KnowsSidesThatOnlyTouch) {
-  const Ring l{{0, 0}, {4, 0}, {4, 2}, {2, 2}, {2, 4}, {0, 4}};
-  EXPECT_TRUE(IsInside({1, 1}, {3, 1}, l));
-  EXPECT_TRUE(IsInside({0, 0}, {2, 2}, l)) << "from corner to corner";
-  EXPECT_TRUE(IsInside({0, 1}, {4, 1}, l)) << "from side to side";
-  EXPECT_FALSE(IsInside({0, 0}, {4, 0}, l)) << "along a side";
-  EXPECT_FALSE(IsInside({1, 0}, {3, 0}, l)) << "along a part of a side";
-  EXPECT_FALSE(IsInside({1, 3}, {3, 1}, l)) << "through a corner";
-  EXPECT_FALSE(IsInside({1, 3}, {3.5, 1.5}, l)) << "around the corner";
-  EXPECT_FALSE(IsInside({5, 1}, {6, 1}, l));
-  EXPECT_FALSE(IsInside({-1, 1}, {3, 1}, l));
+TEST(SharesOutside, AreCutWhereRingsBegin) {
+  const Ring l{{0, 0}, {4, 0}, {4, 2}, {2, 2}, {2, 4}, {0, 4}}, beside{{4, 0}, {8, 0}, {8, 2}, {4, 2}};
+  using Shares = std::vector<std::pair<double, double>>;
+  const auto outside = [&](const PlanePoint& a, const PlanePoint& b) { return SharesOutside(a, b, {&l}); };
+  const Shares none, all{{0, 1}};
+  EXPECT_EQ(outside({1, 1}, {3, 1}), none);
+  EXPECT_EQ(outside({0, 0}, {2, 2}), none) << "from corner to corner";
+  EXPECT_EQ(outside({0, 1}, {4, 1}), none) << "from side to side";
+  EXPECT_EQ(outside({1, 3}, {3, 1}), none) << "through a corner, which is one point";
+  EXPECT_EQ(outside({0, 0}, {4, 0}), all) << "along a side";
+  EXPECT_EQ(outside({1, 0}, {3, 0}), all) << "along a part of a side";
+  EXPECT_EQ(outside({2, 0}, {2, 4}), (Shares{{0.5, 1}})) << "inside, then along a side";
+  EXPECT_EQ(outside({1, 3}, {5, 3}), (Shares{{0.25, 1}})) << "out by a side";
+  EXPECT_EQ(outside({3, 3}, {1, 1}), (Shares{{0, 0.5}})) << "in by a corner";
+  const Shares across = outside({-1, 1}, {5, 1});
+  ASSERT_EQ(across.size(), 2u);
+  EXPECT_TRUE(Rational(across[0].second) >= Rational(1) / 6 && Rational(across[1].first) <= Rational(5) / 6);
+  EXPECT_NEAR(across[0].second + across[1].first, 1, 1e-15);
+  EXPECT_EQ(outside({5, 1}, {6, 1}), all);
+  EXPECT_EQ(SharesOutside({1, 1}, {7, 1}, {&l, &beside}), none) << "a side that two rings share is one point";
+  EXPECT_EQ(SharesOutside({4, 0}, {4, 2}, {&l, &beside}), all) << "along it, no ring is on both sides";
+}
+
+// At points that no cut can be: with corners on a grid its denominator is at most 128.
+TEST(SharesOutside, AreWhatIsStrictlyInsideNoRing) {
+  FreshRandom random;
+  std::uniform_real_distribution<double> place(-4, 4);
+  for (int round = 0; round < 60; ++round) {
+    const auto point = [&] {
+      const double x = place(random), y = place(random);
+      return round % 2 == 0 ? PlanePoint{std::round(x), std::round(y)} : PlanePoint{x, y};
+    };
+    std::vector<Ring> rings;
+    for (int k = 0; k < 3; ++k) {
+      std::vector<PlanePoint> corners;
+      for (int i = 0; i < 4; ++i) corners.push_back(point());
+      if (Ring hull = ConvexHull(corners); hull.size() > 2) rings.push_back(std::move(hull));
+    }
+    std::vector<const Ring*> all;
+    for (const Ring& ring : rings) all.push_back(&ring);
+    const PlanePoint a = point(), b = point();
+    if (a == b) continue;
+    const auto outside = SharesOutside(a, b, all);
+    const auto [ax, ay] = ToExact(a);
+    const auto [bx, by] = ToExact(b);
+    for (int i = 1; i < 131; ++i) {
+      const Rational share = Rational(i) / 131;
+      const ExactPoint p{ax + share * (bx - ax), ay + share * (by - ay)};
+      bool is_inside = false;
+      for (const Ring& ring : rings) {
+        bool is_left = true;
+        for (std::size_t k = 0; k < ring.size(); ++k)
+          is_left &= Cross(ToExact(ring[k]), ToExact(ring[(k + 1) % ring.size()]), p) > 0;
+        is_inside |= is_left;
+      }
+      const bool is_kept = std::ranges::any_of(
+          outside, [&](const auto& part) { return Rational(part.first) <= share && share <= Rational(part.second); });
+      EXPECT_EQ(is_kept, !is_inside) << "round " << round << ", point " << i;
+    }
+  }
 }
 
 TEST(World, CutsLongHullsExactly) {
