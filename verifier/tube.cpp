@@ -1321,8 +1321,8 @@ Real TubeMaker::ScaleAt(int k, const Seen& seen) const {
   return size;
 }
 
-// What some transitions say at the nodes of a plane (ways.h), and the largest of their sizes.
-struct TubeMaker::Plane {
+// What some transitions say at the nodes of a grid (ways.h), and the largest of their sizes.
+struct TubeMaker::Lattice {
   Nodes nodes;
   std::vector<bool> added = {};
   std::ptrdiff_t count = 0;
@@ -1330,48 +1330,48 @@ struct TubeMaker::Plane {
 };
 
 // Made of the largest one there is of a part of these transitions: those of a log become ever more.
-std::shared_ptr<const TubeMaker::Plane> TubeMaker::PlaneOf(int k, const KnownRows& known) const {
+std::shared_ptr<const TubeMaker::Lattice> TubeMaker::LatticeOf(int k, const KnownRows& known) const {
   constexpr std::size_t kKept = 4;
   const Transitions& data = problem_.transitions;
   std::vector<bool> wanted;
   for (int i = 0; i < data.size(); ++i) wanted.push_back(known.Contains(i));
   const std::lock_guard lock(mutex_);
-  std::vector<std::shared_ptr<const Plane>>& planes = planes_[k];
-  std::shared_ptr<const Plane> best;
-  for (const auto& plane : planes) {
-    bool is_part = !best || plane->count > best->count;
-    for (std::size_t i = 0; i < plane->added.size() && is_part; ++i) is_part = !plane->added[i] || wanted[i];
-    if (is_part) best = plane;
+  std::vector<std::shared_ptr<const Lattice>>& lattices = lattices_[k];
+  std::shared_ptr<const Lattice> best;
+  for (const auto& lattice : lattices) {
+    bool is_part = !best || lattice->count > best->count;
+    for (std::size_t i = 0; i < lattice->added.size() && is_part; ++i) is_part = !lattice->added[i] || wanted[i];
+    if (is_part) best = lattice;
   }
   if (best && best->count == std::ranges::count(wanted, true)) return best;
-  const auto plane = std::make_shared<Plane>(best ? *best : Plane{Nodes(ways_, k)});
-  plane->added.resize(wanted.size());
+  const auto lattice = std::make_shared<Lattice>(best ? *best : Lattice{Nodes(ways_, k)});
+  lattice->added.resize(wanted.size());
   for (int i = 0; i < data.size(); ++i) {
-    if (!wanted[ToSize(i)] || plane->added[ToSize(i)]) continue;
+    if (!wanted[ToSize(i)] || lattice->added[ToSize(i)]) continue;
     const auto seen = See(i);
     const auto& [lower, upper] = seen->residual[ToSize(k)];
     if (lower.IsFinite() && upper.IsFinite()) {
-      plane->size = max(plane->size, ScaleAt(k, *seen));
-      plane->nodes.Add(data.z.row(i), lower, upper);
+      lattice->size = max(lattice->size, ScaleAt(k, *seen));
+      lattice->nodes.Add(data.z.row(i), lower, upper);
     }
-    plane->added[ToSize(i)] = true;
-    ++plane->count;
+    lattice->added[ToSize(i)] = true;
+    ++lattice->count;
   }
-  plane->nodes.Spread();
-  planes.push_back(plane);
-  if (planes.size() > kKept) planes.erase(planes.begin());
-  return plane;
+  lattice->nodes.Spread();
+  lattices.push_back(lattice);
+  if (lattices.size() > kKept) lattices.erase(lattices.begin());
+  return lattice;
 }
 
-// Bounds relative to the slopes of a plane where they are much narrower: the certifier's choice, which claims nothing.
+// Bounds relative to slopes at nodes where they are much narrower: the certifier's choice, which claims nothing.
 void TubeMaker::Tilt(const Query& query, int k, const KnownRows& rows, Known& known) const {
-  const std::vector<int> variables = ways_.Plane(k);
+  const std::vector<int> variables = ways_.Axes(k);
   if (!ways_.Narrow(k) || variables.empty()) return;
-  const auto plane = PlaneOf(k, rows);
-  const auto slopes = plane->nodes.SlopesOver(query.center, query.half_width);
+  const auto lattice = LatticeOf(k, rows);
+  const auto slopes = lattice->nodes.SlopesOver(query.center, query.half_width);
   known.is_tie = !slopes;
   if (!slopes || *slopes == Nodes::Slopes{}) return;
-  const auto [lower, upper] = plane->nodes.Over(query.hull, *slopes, query.center);
+  const auto [lower, upper] = lattice->nodes.Over(query.hull, *slopes, query.center);
   Real width = upper - lower;
   for (std::size_t a = 0; a < variables.size(); ++a)
     width += Real(0.53) * Real(2.0) * abs(Real((*slopes)[a])) * query.half_width[ToSize(variables[a])];
@@ -1392,12 +1392,13 @@ void TubeMaker::AddRegions(const Query& query, int k, const KnownRows& known, bo
     if (most < kNone) bounds = {max(bounds.lower, Real(-most)), min(bounds.upper, Real(most))};
   }
   if (!ways_.Narrow(k)) return;
-  if (!ways_.Plane(k).empty()) {
-    const auto plane = PlaneOf(k, known);
-    const auto [lower, upper] = plane->nodes.Over(query.hull, {}, query.center);
-    const Real doubt = in_doubt ? Real(kSeenInDoubles) * plane->size : Real();
+  const std::size_t axes = ways_.Axes(k).size();
+  if (axes > 0) {
+    const auto lattice = LatticeOf(k, known);
+    const auto [lower, upper] = lattice->nodes.Over(query.hull, {}, query.center);
+    const Real doubt = in_doubt ? Real(kSeenInDoubles) * lattice->size : Real();
     bounds = {max(bounds.lower, lower - doubt), min(bounds.upper, upper + doubt)};
-    return;
+    if (axes < 3) return;
   }
   const Row row(problem_.declaration, query, k);
   const Transitions& data = problem_.transitions;

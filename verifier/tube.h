@@ -171,8 +171,8 @@ class TubeMaker final {
   void AddRegions(const Query& query, int k, const KnownRows& known, bool in_doubt, Bounds& bounds) const;
   void Tilt(const Query& query, int k, const KnownRows& rows, Known& known) const;
   [[nodiscard]] Real ScaleAt(int k, const Seen& seen) const;
-  struct Plane;
-  [[nodiscard]] std::shared_ptr<const Plane> PlaneOf(int k, const KnownRows& known) const;
+  struct Lattice;
+  [[nodiscard]] std::shared_ptr<const Lattice> LatticeOf(int k, const KnownRows& known) const;
   [[nodiscard]] Failure NoAffineResidual(int step, int k, bool is_visible) const;
   [[nodiscard]] std::optional<Failure> MakeAffine(const KnownRows& known, Affine& affine) const;
   void AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
@@ -204,9 +204,9 @@ class TubeMaker final {
     std::vector<double> lower, upper, scale;
   };
   std::vector<RoughResiduals> rough_residuals_;  // of each state
-  /** The latest planes of each row, of different known transitions. */
+  /** The latest lattices of each row, of different known transitions. */
   mutable std::mutex mutex_;
-  mutable std::map<int, std::vector<std::shared_ptr<const Plane>>> planes_;
+  mutable std::map<int, std::vector<std::shared_ptr<const Lattice>>> lattices_;
   std::vector<std::pair<int, Failure>> too_much_;  ///< The transitions of FindTooMuch, in their order.
   /** The rounding error that the remainder may have added to the certifier's columns. */
   double remainder_rounding_;

@@ -135,17 +135,17 @@ double Ways::LargestOf(const BoundOf& bound_of, double everywhere, Box box) cons
   return everywhere;
 }
 
-std::vector<int> Ways::Plane(int k) const {
+std::vector<int> Ways::Axes(int k) const {
   const auto [lower, upper] = problem_.domain.Corners();
   Box domain;
   for (std::size_t l = 0; l < lower.size(); ++l) domain.emplace_back(lower[l], upper[l]);
-  std::vector<int> plane;
+  std::vector<int> axes;
   for (int l = 0; l < std::ssize(sides_); ++l)
     if (!sides_[ToSize(l)].empty())
-      plane.push_back(l);
+      axes.push_back(l);
     else if (LargestSlope(k, l, domain) > 0)
       return {};
-  return plane.size() > 2 ? std::vector<int>() : plane;
+  return axes;
 }
 
 namespace {
@@ -188,56 +188,72 @@ constexpr double kSlopes = 250.7;
 }  // namespace
 
 Nodes::Nodes(const Ways& ways, int k) : ways_(ways), k_(k) {
-  const std::vector<int> plane = ways.Plane(k);
   const auto [lower, upper] = ways.problem_.domain.Corners();
-  const auto count = [&] { return (axes_[0].ticks.size() - 1) * (axes_[1].ticks.size() - 1); };
+  Ways::Box domain;
+  for (std::size_t l = 0; l < lower.size(); ++l) domain.emplace_back(lower[l], upper[l]);
   for (std::size_t parts = kMostStrips;; parts -= parts / 32 + 1) {
-    for (std::size_t a = 0; a < plane.size(); ++a) {
-      const auto l = ToSize(plane[a]);
+    std::size_t cells = 1;
+    axes_.clear();
+    for (const int variable : ways.Axes(k)) {
+      const auto l = ToSize(variable);
       std::vector<double> ends{lower[l]};
       for (const double side : ways.sides_[l])
         if (lower[l] < side && side < upper[l] && side != ends.back()) ends.push_back(side);
       ends.push_back(upper[l]);
-      axes_[a] = {plane[a], Divided(ends, parts)};
+      axes_.push_back({variable, Divided(ends, parts), ways.LargestSlope(k, variable, domain)});
+      cells *= axes_.back().ticks.size() - 1;
     }
-    if (count() <= kMostCells || parts == 1) break;
+    if (cells <= kMostCells || parts == 1) break;
   }
-  Ways::Box domain;
-  for (std::size_t l = 0; l < lower.size(); ++l) domain.emplace_back(lower[l], upper[l]);
-  for (std::size_t a = 0; a < plane.size(); ++a) largest_slopes_[a] = ways.LargestSlope(k, plane[a], domain);
-  const std::size_t nodes = axes_[0].ticks.size() * axes_[1].ticks.size();
+  std::size_t nodes = 1;
+  for (Axis& axis : axes_) axis.stride = std::exchange(nodes, nodes * axis.ticks.size());
   constexpr double kUnbounded = std::numeric_limits<double>::infinity();
   sides_.fill({std::vector<Real>(nodes, Real(kUnbounded)), std::vector<double>(nodes, kUnbounded)});
-  const std::size_t rows = axes_[0].ticks.size() - 1, columns = axes_[1].ticks.size() - 1;
-  std::array<std::vector<double>, 2> cells;
-  for (std::size_t a = 0; a < 2; ++a)
-    for (std::size_t i = 0; i < rows; ++i)
-      for (std::size_t j = 0; j < columns; ++j)
-        cells[a].push_back(Slope(a, {std::pair(i, i + 1), std::pair(j, j + 1)}));
-  const auto in_cell = [&](std::size_t a, std::size_t i, std::size_t j) { return cells[a][i * columns + j]; };
-  // An edge lies in the cells on both sides, or the one.
-  for (std::size_t i = 0; i <= rows; ++i)
-    for (std::size_t j = 0; j <= columns; ++j) {
-      const std::size_t below = i == 0 ? 0 : i - 1, left = j == 0 ? 0 : j - 1;
-      const std::size_t above = std::min(i, rows - 1), right = std::min(j, columns - 1);
-      slopes_[0].push_back(i == rows ? 0 : std::min(in_cell(0, i, left), in_cell(0, i, right)));
-      slopes_[1].push_back(j == columns ? 0 : std::min(in_cell(1, below, j), in_cell(1, above, j)));
+  for (Axis& axis : axes_) axis.slopes.assign(nodes, kUnbounded);
+  for (std::size_t cell = 0; cell < nodes; ++cell) {
+    if (std::ranges::any_of(axes_, [&](const Axis& axis) { return TickOf(axis, cell) + 1 == axis.ticks.size(); }))
+      continue;
+    // Each edge lies in all cells that have it.
+    const std::vector<std::size_t> corners = CornersOf(cell);
+    for (Axis& axis : axes_) {
+      const double slope = Slope(axis, cell);
+      for (const std::size_t node : corners)
+        if (TickOf(axis, node) == TickOf(axis, cell)) axis.slopes[node] = std::min(axis.slopes[node], slope);
     }
+  }
 }
 
-// Over the box between these ticks.
-double Nodes::Slope(std::size_t axis, std::array<std::pair<std::size_t, std::size_t>, 2> ticks) const {
-  if (axes_[axis].variable < 0) return 0;
+std::vector<std::size_t> Nodes::CornersOf(std::size_t cell) const {
+  std::vector<std::size_t> corners{cell};
+  for (const Axis& axis : axes_)
+    for (std::size_t i = corners.size(); i-- > 0;) corners.push_back(corners[i] + axis.stride);
+  return corners;
+}
+
+// Where the first axes up to this one run from a node: the least of the cells around.
+double Nodes::SlopeOn(std::size_t a, std::size_t node) const {
+  std::vector<std::size_t> cells{node};
+  for (std::size_t b = a + 1; b < axes_.size(); ++b) {
+    const std::size_t tick = TickOf(axes_[b], node);
+    std::vector<std::size_t> around;
+    for (const std::size_t cell : cells) {
+      if (tick > 0) around.push_back(cell - axes_[b].stride);
+      if (tick + 1 < axes_[b].ticks.size()) around.push_back(cell);
+    }
+    cells = std::move(around);
+  }
+  double least = std::numeric_limits<double>::infinity();
+  for (const std::size_t cell : cells) least = std::min(least, Slope(axes_[a], cell));
+  return least;
+}
+
+double Nodes::Slope(const Axis& along, std::size_t cell) const {
   Ways::Box box(ways_.sides_.size());
-  for (std::size_t a = 0; a < 2; ++a)
-    if (axes_[a].variable >= 0)
-      box[ToSize(axes_[a].variable)] = {axes_[a].ticks[ticks[a].first], axes_[a].ticks[ticks[a].second]};
-  return ways_.LargestSlope(k_, axes_[axis].variable, box);
-}
-
-// The last strip that begins at or below.
-std::size_t Nodes::StripOf(const Axis& axis, double at) const {
-  return ToSize(std::upper_bound(axis.ticks.begin(), axis.ticks.end() - 1, at) - axis.ticks.begin()) - 1;
+  for (const Axis& axis : axes_) {
+    const std::size_t tick = TickOf(axis, cell);
+    box[ToSize(axis.variable)] = {axis.ticks[tick], axis.ticks[tick + 1]};
+  }
+  return ways_.LargestSlope(k_, along.variable, box);
 }
 
 void Nodes::Reach(Side& side, std::size_t node, const Real& value) const {
@@ -249,41 +265,42 @@ void Nodes::Reach(Side& side, std::size_t node, const Real& value) const {
 }
 
 void Nodes::Add(const Eigen::VectorXd& z, const Real& lower, const Real& upper) {
-  std::array<double, 2> at{};
-  std::array<std::pair<std::size_t, std::size_t>, 2> strips;
-  for (std::size_t a = 0; a < 2; ++a) {
-    if (axes_[a].variable >= 0) at[a] = z[axes_[a].variable];
-    if (!(axes_[a].ticks.front() <= at[a] && at[a] <= axes_[a].ticks.back())) return;
-    const std::size_t strip = StripOf(axes_[a], at[a]);
-    strips[a] = {strip, strip + 1};
+  std::size_t cell = 0;
+  for (const Axis& axis : axes_) {
+    const std::vector<double>& ticks = axis.ticks;
+    const double at = z[axis.variable];
+    if (!(ticks.front() <= at && at <= ticks.back())) return;
+    // The last strip that begins at or below.
+    cell += axis.stride * ToSize(std::upper_bound(ticks.begin() + 1, ticks.end() - 1, at) - ticks.begin() - 1);
   }
-  const Real first(Slope(0, strips)), second(Slope(1, strips));
-  for (const std::size_t i : {strips[0].first, strips[0].second})
-    for (const std::size_t j : {strips[1].first, strips[1].second}) {
-      const Real way =
-          first * abs(Real(axes_[0].ticks[i]) - Real(at[0])) + second * abs(Real(axes_[1].ticks[j]) - Real(at[1]));
-      const std::size_t node = i * axes_[1].ticks.size() + j;
-      Reach(sides_[0], node, upper + way);
-      Reach(sides_[1], node, way - lower);
+  for (const std::size_t node : CornersOf(cell)) {
+    Real way;
+    std::size_t begin = cell;  // of a move along the last axis first, then on the sides of the cell
+    for (std::size_t a = axes_.size(); a-- > 0;) {
+      const Axis& axis = axes_[a];
+      const std::size_t tick = TickOf(axis, node);
+      way += Real(SlopeOn(a, begin)) * abs(Real(axis.ticks[tick]) - Real(z[axis.variable]));
+      begin += (tick - TickOf(axis, cell)) * axis.stride;
     }
+    Reach(sides_[0], node, upper + way);
+    Reach(sides_[1], node, way - lower);
+  }
 }
 
 // The least first, as far as doubles tell: in another order the same is found.
 void Nodes::Spread(Side& side) const {
-  const std::array<std::size_t, 2> sizes{axes_[0].ticks.size(), axes_[1].ticks.size()};
   while (!side.waiting.empty()) {
     std::ranges::pop_heap(side.waiting);
     const auto [rank, node] = side.waiting.back();
     side.waiting.pop_back();
     if (-rank != side.roughly[node]) continue;
-    const std::array<std::size_t, 2> at{node / sizes[1], node % sizes[1]};
-    for (std::size_t a = 0; a < 2; ++a)
+    for (const Axis& axis : axes_)
       for (const bool up : {false, true}) {
-        if (up ? at[a] + 1 == sizes[a] : at[a] == 0) continue;
-        const std::size_t stride = a == 0 ? sizes[1] : 1, next = up ? node + stride : node - stride,
-                          first = up ? at[a] : at[a] - 1;
-        const double begin = axes_[a].ticks[first], end = axes_[a].ticks[first + 1];
-        const double slope = slopes_[a][std::min(node, next)], roughly = side.roughly[node] + slope * (end - begin);
+        const std::size_t at = TickOf(axis, node), first = up ? at : at - 1;
+        if (up ? at + 1 == axis.ticks.size() : at == 0) continue;
+        const std::size_t next = up ? node + axis.stride : node - axis.stride;
+        const double begin = axis.ticks[first], end = axis.ticks[first + 1];
+        const double slope = axis.slopes[std::min(node, next)], roughly = side.roughly[node] + slope * (end - begin);
         // Also where numbers are too large or too small for doubles to tell.
         if (const double known = side.roughly[next]; std::abs(roughly) > 1e-250 && known < 1e250 &&
                                                      roughly - known > kRoughly * (std::abs(roughly) + std::abs(known)))
@@ -298,52 +315,54 @@ void Nodes::Spread() {
 }
 
 std::pair<Real, Real> Nodes::Over(std::span<const Real> box, const Slopes& slopes, std::span<const Real> center) const {
-  std::array<Real, 2> lower, upper, middle;
-  std::array<std::pair<std::size_t, std::size_t>, 2> strips{};
-  for (std::size_t a = 0; a < 2; ++a) {
-    const auto& [variable, ticks] = axes_[a];
-    if (variable < 0) continue;
-    middle[a] = center[ToSize(variable)];
-    lower[a] = max(Real(ticks.front()), box[ToSize(variable)].lower());
-    upper[a] = min(Real(ticks.back()), box[ToSize(variable)].upper());
-    for (std::size_t i = 0; i + 1 < ticks.size(); ++i) {
-      if (CertainlyAtMost(Real(ticks[i]), lower[a])) strips[a].first = i;
-      if (!CertainlyAtMost(upper[a], Real(ticks[i]))) strips[a].second = i;
+  std::vector<std::pair<Real, Real>> part;
+  std::vector<std::size_t> cells{0};  // that the box meets
+  for (const auto& axis : axes_) {
+    const auto l = ToSize(axis.variable);
+    part.emplace_back(max(Real(axis.ticks.front()), box[l].lower()), min(Real(axis.ticks.back()), box[l].upper()));
+    std::size_t first = 0, last = 0;
+    for (std::size_t i = 0; i + 1 < axis.ticks.size(); ++i) {
+      if (CertainlyAtMost(Real(axis.ticks[i]), part.back().first)) first = i;
+      if (!CertainlyAtMost(part.back().second, Real(axis.ticks[i]))) last = i;
     }
-    strips[a].second = std::max(strips[a].first, strips[a].second);
+    std::vector<std::size_t> met;
+    for (const std::size_t cell : cells)
+      for (std::size_t i = first; i <= std::max(first, last); ++i) met.push_back(cell + i * axis.stride);
+    cells = std::move(met);
   }
   std::array<std::optional<Real>, 2> most;
-  const std::size_t stride = axes_[1].ticks.size();
-  for (std::size_t i = strips[0].first; i <= strips[0].second; ++i)
-    for (std::size_t j = strips[1].first; j <= strips[1].second; ++j) {
-      const std::array<std::pair<std::size_t, std::size_t>, 2> cell{std::pair(i, i + 1), std::pair(j, j + 1)};
-      const double first = Slope(0, cell), second = Slope(1, cell);
-      const Real a(axes_[0].ticks[i]), b(axes_[0].ticks[i + 1]), c(axes_[1].ticks[j]), d(axes_[1].ticks[j + 1]);
-      for (std::size_t s = 0; s < 2; ++s) {
-        const double sign = s == 0 ? 1 : -1;
-        const auto value = [&](std::size_t m, std::size_t n) {
-          return sides_[s].values[(i + m) * stride + j + n] -
-                 Real(sign) * (Real(slopes[0]) * ((m == 0 ? a : b) - middle[0]) +
-                               Real(slopes[1]) * ((n == 0 ? c : d) - middle[1]));
-        };
-        const auto along = [&](std::size_t end) {
-          return Most(value(0, end), value(1, end), first, sign * slopes[0], a, b, max(lower[0], a), min(upper[0], b));
-        };
-        const Real here = Most(along(0), along(1), second, sign * slopes[1], c, d, max(lower[1], c), min(upper[1], d));
-        most[s] = most[s] ? max(*most[s], here) : here;
-      }
+  for (const std::size_t cell : cells) {
+    for (std::size_t s = 0; s < 2; ++s) {
+      const double sign = s == 0 ? 1 : -1;
+      // Where the first axes run over the part of the cell, the others being at a node.
+      const auto most_over = [&](const auto& self, std::size_t axes, std::size_t node) -> Real {
+        if (axes == 0) {
+          Real value = sides_[s].values[node];
+          for (std::size_t a = 0; a < axes_.size(); ++a)
+            value -= Real(sign) * Real(slopes[a]) *
+                     (Real(axes_[a].ticks[TickOf(axes_[a], node)]) - center[ToSize(axes_[a].variable)]);
+          return value;
+        }
+        const std::size_t a = axes - 1, tick = TickOf(axes_[a], cell);
+        const Real begin(axes_[a].ticks[tick]), end(axes_[a].ticks[tick + 1]);
+        return Most(self(self, a, node), self(self, a, node + axes_[a].stride), SlopeOn(a, node), sign * slopes[a],
+                    begin, end, max(part[a].first, begin), min(part[a].second, end));
+      };
+      const Real here = most_over(most_over, axes_.size(), cell);
+      most[s] = most[s] ? max(*most[s], here) : here;
     }
+  }
   return {-*most[1], *most[0]};
 }
 
 // By how much the middle of the bounds rises between two points, in parts of which the largest slope has 250.7.
 std::optional<Nodes::Slopes> Nodes::SlopesOver(std::span<const Real> center, std::span<const Real> half_width) const {
   Slopes slopes{};
-  for (std::size_t a = 0; a < 2; ++a) {
-    const auto& [variable, ticks] = axes_[a];
-    const double range = ticks.back() - ticks.front(), part = largest_slopes_[a] / kSlopes;
-    if (!(part > 0) || !(range > 0) || !(largest_slopes_[a] * range < 0x1p900)) continue;
-    const auto l = ToSize(variable);
+  for (std::size_t a = 0; a < axes_.size() && axes_.size() < 3; ++a) {
+    const std::vector<double>& ticks = axes_[a].ticks;
+    const double range = ticks.back() - ticks.front(), part = axes_[a].largest_slope / kSlopes;
+    if (!(part > 0) || !(range > 0) || !(axes_[a].largest_slope * range < 0x1p900)) continue;
+    const auto l = ToSize(axes_[a].variable);
     const double width = 2 * half_width[l].ToDouble(), least = range / static_cast<double>(ticks.size() - 1) * 0.31;
     if (std::abs(width - least) <= kNear * least) return std::nullopt;
     if (!(width > least)) continue;

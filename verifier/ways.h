@@ -3,7 +3,7 @@ order of the moves is tried, each way is cut at the sides of regions that it mee
 is looked up among the regions themselves. So is what else they bound, in each piece into which their sides cut a box.
 The certifier's grid (residual/region_grid.h) shares nothing with this.
 
-Where one or two variables decide, ways along edges of a grid are tried, too: its ticks are those of the certifier
+Where these variables alone decide, ways along edges of a grid are tried, too: its ticks are those of the certifier
 (soundness 3.20), a choice that claims nothing. What is found at its nodes is spread from all observations at once,
 again with slopes from the regions themselves. */
 #pragma once
@@ -41,9 +41,8 @@ class Ways final {
   /** Without what lies outside the domain's box. */
   void Cut(Box& box) const;
 
-  /** The variables on which r_k depends, those by which regions are bounded: none if these are more than two, or others
-  have slopes, too. */
-  [[nodiscard]] std::vector<int> Plane(int k) const;
+  /** The variables by which regions are bounded: none if r_k depends on others, too. */
+  [[nodiscard]] std::vector<int> Axes(int k) const;
 
  private:
   friend class Nodes;
@@ -60,18 +59,18 @@ class Ways final {
   std::vector<std::vector<int>> moves_;     // the variables that move together
 };
 
-/** Bounds on r_k at the nodes of a grid in the plane of its variables, and from these over a box. */
+/** Bounds on r_k at the nodes of a grid over its variables, and from these over a box. */
 class Nodes final {
  public:
-  /** @param ways must outlive this object. @pre ways.Plane(k) is not empty. */
+  /** @param ways must outlive this object. @pre ways.Axes(k) is not empty. */
   Nodes(const Ways& ways, int k);
 
   /** An observation: lower <= r_k(z) <= upper. It counts from the next Spread on. */
   void Add(const Eigen::VectorXd& z, const Real& lower, const Real& upper);
   void Spread();
 
-  /** Along the plane's variables. */
-  using Slopes = std::array<double, 2>;
+  /** Along ways.Axes(k), zeros behind them. */
+  using Slopes = std::array<double, Region::kMaxVariables>;
   /** The least and the largest that r_k(z) - sum of slope (z - center) can be over a box; box and center are ranges of
   all variables. */
   [[nodiscard]] std::pair<Real, Real> Over(std::span<const Real> box, const Slopes& slopes,
@@ -81,8 +80,11 @@ class Nodes final {
 
  private:
   struct Axis {
-    int variable = -1;  // -1: none, and a strip without width
-    std::vector<double> ticks = {0, 0};
+    int variable;
+    std::vector<double> ticks;
+    double largest_slope;             // over the domain
+    std::size_t stride = 0;           // from a node to the next
+    std::vector<double> slopes = {};  // by node: along the edge to the next
   };
   // Upper bounds on sign * r_k. Doubles near them tell what may be less; those that wait have not told their
   // neighbours.
@@ -94,14 +96,17 @@ class Nodes final {
 
   void Reach(Side& side, std::size_t node, const Real& value) const;
   void Spread(Side& side) const;
-  [[nodiscard]] double Slope(std::size_t axis, std::array<std::pair<std::size_t, std::size_t>, 2> ticks) const;
-  [[nodiscard]] std::size_t StripOf(const Axis& axis, double at) const;
+  // A cell is known by its least node.
+  [[nodiscard]] std::vector<std::size_t> CornersOf(std::size_t cell) const;
+  [[nodiscard]] double Slope(const Axis& along, std::size_t cell) const;
+  [[nodiscard]] double SlopeOn(std::size_t a, std::size_t node) const;
+  [[nodiscard]] static std::size_t TickOf(const Axis& axis, std::size_t node) {
+    return node / axis.stride % axis.ticks.size();
+  }
 
   const Ways& ways_;
   int k_;
-  std::array<Axis, 2> axes_;
-  std::array<std::vector<double>, 2> slopes_;  // by axis and node: along the edge to the next node
-  std::array<double, 2> largest_slopes_{};     // by axis, over the domain
+  std::vector<Axis> axes_;
   std::array<Side, 2> sides_;
 };
 

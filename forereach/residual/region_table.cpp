@@ -73,53 +73,109 @@ struct Tent {
   }
 };
 
+// Cells that follow each other along the last axis.
+template <std::size_t kAll>
+struct CellRow {
+  const std::array<double, 2>* values;
+  std::array<const double*, kAll> slopes;
+  std::array<std::size_t, kAll> strides;
+  std::array<Lanes, kAll> tilt;
+  // Of the cell: its sides, the parts that are asked for, and what the tilt takes off at their ends.
+  std::array<std::array<double, 2>, kAll> side{}, part{};
+  std::array<std::array<Lanes, 2>, kAll> taken{};
+  std::array<Tent, kAll> tents{};
+
+  FOREREACH_INLINE void Enter(std::size_t a, const double* ticks, double lower, double upper) {
+    side[a] = {ticks[0], ticks[1]};
+    part[a] = {std::max(lower, ticks[0]), std::min(upper, ticks[1])};
+    if (tents[a].slope >= 0) tents[a].SetPart(ticks[0], ticks[1], part[a][0], part[a][1]);
+  }
+  // Along an axis from a node, of what is `near` and `far`.
+  FOREREACH_INLINE Lanes Between(std::size_t a, std::size_t node, const Lanes& near, const Lanes& far) {
+    Tent& tent = tents[a];
+    if (const double slope = slopes[a][node]; slope != tent.slope) {
+      tent.SetSlope(slope, tilt[a]);
+      tent.SetPart(side[a][0], side[a][1], part[a][0], part[a][1]);
+    }
+    return tent.Largest(near, far);
+  }
+  // Where the first axes run from a node, and the tilt takes `off` there.
+  template <std::size_t kAxes>
+  FOREREACH_INLINE Lanes Over(std::size_t node, const Lanes& off) {
+    if constexpr (kAxes == 0) {
+      return AtNode(values[node]) - off;
+    } else {
+      constexpr std::size_t a = kAxes - 1;
+      const Lanes near = Over<a>(node, off + taken[a][0]), far = Over<a>(node + strides[a], off + taken[a][1]);
+      return Between(a, node, near, far);
+    }
+  }
+};
+
 }  // namespace
 
 RegionTable::RegionTable(const RegionGrid& grid, std::size_t row, std::span<const double> domain_lower,
                          std::span<const double> domain_upper) {
-  const std::vector<int>& variables = grid.variables();
   const auto cells = [&](std::size_t parts) {
+    axes_.clear();
     std::size_t count = 1;
-    for (std::size_t a = 0; a < variables.size(); ++a) {
-      const auto l = ToSize(variables[a]);
-      axes_[a].variable = variables[a];
-      axes_[a].ticks = TicksOf(domain_lower[l], domain_upper[l], grid.cuts(a), parts);
-      count *= axes_[a].ticks.size() - 1;
+    for (const int variable : grid.variables()) {
+      const auto l = ToSize(variable);
+      axes_.push_back({variable, TicksOf(domain_lower[l], domain_upper[l], grid.cuts(axes_.size()), parts)});
+      count *= axes_.back().ticks.size() - 1;
     }
     return count;
   };
   for (std::size_t parts = kMostStrips; cells(parts) > kMostCells && parts > 1;) parts -= parts / 32 + 1;
 
-  RegionGrid::Box cell{};
-  for (std::size_t i = 0; i + 1 < axes_[0].ticks.size(); ++i)
-    for (std::size_t j = 0; j + 1 < axes_[1].ticks.size(); ++j) {
-      const std::array<std::size_t, 2> at{i, j};
-      for (std::size_t a = 0; a < variables.size(); ++a) {
-        cell.lower[ToSize(variables[a])] = axes_[a].ticks[at[a]];
-        cell.upper[ToSize(variables[a])] = axes_[a].ticks[at[a] + 1];
-      }
-      grid.Find(cell);
-      for (std::size_t a = 0; a < 2; ++a) {
-        const double slope = a < variables.size() ? grid.LargestSlope(row, a, cell) : 0;
-        axes_[a].slopes.push_back(slope);
-        largest_way_ = std::max(largest_way_, MulUp(slope, SubUp(axes_[a].ticks[at[a] + 1], axes_[a].ticks[at[a]])));
-      }
+  std::size_t nodes = 1;
+  for (std::size_t a = axes_.size(); a-- > 0; nodes *= axes_[a].ticks.size()) axes_[a].stride = nodes;
+  values_.assign(nodes, {kInfinity, kInfinity});
+  if (axes_.size() == 3) sources_.assign(nodes, {-1, -1});
+  RegionGrid::Box cell{}, domain{};
+  for (std::size_t node = 0; node < nodes; ++node) {
+    bool is_cell = true;
+    for (const Axis& axis : axes_) {
+      const std::size_t tick = node / axis.stride % axis.ticks.size();
+      is_cell &= tick + 1 < axis.ticks.size();
+      if (!is_cell) break;
+      cell.lower[ToSize(axis.variable)] = axis.ticks[tick];
+      cell.upper[ToSize(axis.variable)] = axis.ticks[tick + 1];
     }
-  for (std::size_t a = 0; a < variables.size(); ++a) {
+    if (is_cell) grid.Find(cell);
+    for (std::size_t a = 0; a < axes_.size(); ++a) {
+      const auto l = ToSize(axes_[a].variable);
+      axes_[a].slopes.push_back(is_cell ? grid.LargestSlope(row, a, cell) : kInfinity);
+      if (is_cell)
+        largest_way_ = std::max(largest_way_, MulUp(axes_[a].slopes.back(), SubUp(cell.upper[l], cell.lower[l])));
+    }
+  }
+  std::ranges::copy(domain_lower, domain.lower.begin());
+  std::ranges::copy(domain_upper, domain.upper.begin());
+  grid.Find(domain);
+  for (std::size_t a = 0; a < axes_.size(); ++a) {
     Axis& axis = axes_[a];
-    const double width = axis.ticks.back() - axis.ticks.front(), largest = std::ranges::max(axis.slopes);
-    axis.quantum = largest * width < kLargestTilt ? largest / kSlopes : 0;
+    // What lies on the sides of cells lies in all around it: the least slope holds. Before a first tick there is none.
+    const auto spread = [&](std::vector<double>& slopes, const Axis& other) {
+      for (std::size_t node = nodes; node-- > other.stride;)
+        slopes[node] = std::min(slopes[node], slopes[node - other.stride]);
+    };
+    for (std::size_t after = a + 1; after < axes_.size(); ++after) spread(axis.slopes, axes_[after]);
+    axis.costs = axis.slopes;
+    for (std::size_t before = 0; before < a; ++before) spread(axis.costs, axes_[before]);
+    for (std::size_t node = 0; node < nodes; ++node)
+      if (const std::size_t tick = node / axis.stride % axis.ticks.size(); tick + 1 < axis.ticks.size())
+        axis.costs[node] = MulUp(axis.costs[node], SubUp(axis.ticks[tick + 1], axis.ticks[tick]));
+    const double width = axis.ticks.back() - axis.ticks.front(), largest = grid.LargestSlope(row, a, domain);
+    axis.quantum = axes_.size() < 3 && largest * width < kLargestTilt ? largest / kSlopes : 0;
     axis.least_width = width / static_cast<double>(axis.ticks.size() - 1) * kLeastStrips;
   }
-  values_.assign(axes_[0].ticks.size() * axes_[1].ticks.size(), {kInfinity, kInfinity});
 }
 
 // False if no part of the box lies between the ticks.
 bool RegionTable::Cover(const Axis& axis, const RegionGrid::Box& box, Part& part) noexcept {
   const std::vector<double>& ticks = axis.ticks;
-  const bool is_axis = axis.variable >= 0;
-  const double lower = is_axis ? box.lower[ToSize(axis.variable)] : 0,
-               upper = is_axis ? box.upper[ToSize(axis.variable)] : 0;
+  const double lower = box.lower[ToSize(axis.variable)], upper = box.upper[ToSize(axis.variable)];
   if (!(lower <= upper && lower <= ticks.back() && upper >= ticks.front())) return false;  // also of NaN
   part.lower = std::max(ticks.front(), lower);
   part.upper = std::min(ticks.back(), upper);
@@ -130,102 +186,125 @@ bool RegionTable::Cover(const Axis& axis, const RegionGrid::Box& box, Part& part
   return true;
 }
 
-// Of the edge from node (i, j) up along an axis: it belongs to the cells on both sides, so the lesser slope holds.
-double RegionTable::Cost(std::size_t a, std::size_t i, std::size_t j) const {
-  const auto& [first, second] = axes_;
-  const Axis& along = axes_[a];
-  const std::size_t at = a == 0 ? j : i, strips = (a == 0 ? second : first).ticks.size() - 1;
-  double slope = kInfinity;
-  if (at < strips) slope = along.slopes[CellAt(i, j)];
-  if (at > 0) slope = std::min(slope, along.slopes[a == 0 ? CellAt(i, j - 1) : CellAt(i - 1, j)]);
-  const std::size_t tick = a == 0 ? i : j;
-  return MulUp(slope, SubUp(along.ticks[tick + 1], along.ticks[tick]));
+bool RegionTable::Cover(const RegionGrid::Box& box, Parts& parts) const noexcept {
+  for (std::size_t a = 0; a < axes_.size(); ++a)
+    if (!Cover(axes_[a], box, parts[a])) return false;
+  return true;
 }
 
-// Dijkstra: of two ways to a node the cheaper counts, each sum rounded up.
-void RegionTable::Spread(std::size_t side, const std::vector<Reached>& reached) {
-  const auto is_farther = [](const Reached& a, const Reached& b) { return a.value > b.value; };
-  std::priority_queue<Reached, std::vector<Reached>, decltype(is_farther)> queue(is_farther);
-  const auto reach = [&](std::size_t node, double value) {
-    if (!(value < values_[node][side])) return;
-    values_[node][side] = value;
-    largest_value_ = std::max(largest_value_, std::abs(value));
-    queue.push({value, static_cast<std::uint32_t>(node)});
-  };
-  for (const Reached& one : reached) reach(one.node, one.value);
-  const std::size_t rows = axes_[0].ticks.size(), columns = axes_[1].ticks.size();
-  while (!queue.empty()) {
-    const auto [value, node] = queue.top();
-    queue.pop();
-    if (value > values_[node][side]) continue;
-    const std::size_t i = node / columns, j = node % columns;
-    if (i > 0) reach(node - columns, AddUp(value, Cost(0, i - 1, j)));
-    if (i + 1 < rows) reach(node + columns, AddUp(value, Cost(0, i, j)));
-    if (j > 0) reach(node - 1, AddUp(value, Cost(1, i, j - 1)));
-    if (j + 1 < columns) reach(node + 1, AddUp(value, Cost(1, i, j)));
-  }
-}
-
-void RegionTable::Add(std::span<const double> z, double floor, double ceiling) {
+bool RegionTable::CoverPoint(std::span<const double> z, Parts& parts) const noexcept {
   RegionGrid::Box at;
   std::ranges::copy(z, at.lower.begin());
   std::ranges::copy(z, at.upper.begin());
-  Parts part;
-  if (!Cover(at, part)) return;
-  const std::size_t i = part[0].first, j = part[1].first;
-  const auto way = [&](std::size_t a, std::size_t tick) {
-    const double away =
-        std::max(SubUp(axes_[a].ticks[tick], part[a].lower), SubUp(part[a].lower, axes_[a].ticks[tick]));
-    return MulUp(axes_[a].slopes[CellAt(i, j)], away);
-  };
-  for (std::size_t side = 0; side < 2; ++side) {
-    std::vector<Reached> corners;
-    for (const std::size_t p : {i, i + 1})
-      for (const std::size_t q : {j, j + 1})
-        corners.push_back({AddUp(side == 0 ? ceiling : -floor, AddUp(way(0, p), way(1, q))),
-                           static_cast<std::uint32_t>(NodeAt(p, q))});
-    Spread(side, corners);
-  }
-  // Nine roundings at most, of terms that are no larger: docs/soundness.md, 3.20.
-  error_ = AddUp(MulUp(16 * kUnitRoundoff, AddUp(largest_value_, MulUp(2, largest_way_))), 0x1p-1060);
+  return Cover(at, parts);
 }
 
-// In each cell along the first axis at both ends of the second, then along the second. Neighbours with the same slope
-// have the same bounds where they meet.
-RegionTable::Bounds RegionTable::OverInline(const Parts& parts, const Tilt& tilt) const noexcept {
-  const Axis &first = axes_[0], &second = axes_[1];
-  const Lanes tilt_across = Tilted(tilt.slope[0]), tilt_along = Tilted(tilt.slope[1]), infinity = AllLanes(kInfinity);
-  Lanes largest = -infinity;
-  Tent along;
-  for (std::size_t i = parts[0].first; i <= parts[0].last; ++i) {
-    const double begin = first.ticks[i], end = first.ticks[i + 1];
-    const Lanes rise = tilt_across * AllLanes(begin - tilt.center[0]),
-                rise_at_end = tilt_across * AllLanes(end - tilt.center[0]);
-    Tent across;
-    Lanes near{}, far{};
-    const auto at = [&](std::size_t j) __attribute__((always_inline)) {
-      const Lanes more = tilt_along * AllLanes(second.ticks[j] - tilt.center[1]);
-      return across.Largest(AtNode(values_[NodeAt(i, j)]) - (rise + more),
-                            AtNode(values_[NodeAt(i + 1, j)]) - (rise_at_end + more));
-    };
-    for (std::size_t j = parts[1].first; j <= parts[1].last; ++j) {
-      const std::size_t cell = CellAt(i, j);
-      near = far;
-      if (first.slopes[cell] != across.slope) {
-        across.SetSlope(first.slopes[cell], tilt_across);
-        across.SetPart(begin, end, std::max(parts[0].lower, begin), std::min(parts[0].upper, end));
-        near = at(j);
-      }
-      far = at(j + 1);
-      if (second.slopes[cell] != along.slope) along.SetSlope(second.slopes[cell], tilt_along);
-      const double left = second.ticks[j], right = second.ticks[j + 1];
-      along.SetPart(left, right, std::max(parts[1].lower, left), std::min(parts[1].upper, right));
-      const Lanes here = along.Largest(near, far);
-      largest = Max(here < infinity ? here : infinity, largest);  // what is no number bounds nothing
+// Of the first cell of the parts: at the upper ends along the axes whose bits are set.
+std::size_t RegionTable::Corner(const Parts& parts, std::size_t corner) const noexcept {
+  std::size_t node = 0;
+  for (std::size_t a = 0; a < axes_.size(); ++a) node += (parts[a].first + (corner >> a & 1)) * axes_[a].stride;
+  return node;
+}
+
+void RegionTable::Add(int id, std::span<const double> z, double floor, double ceiling) {
+  Parts at;
+  if (!CoverPoint(z, at)) return;
+  for (std::size_t corner = 0; corner < std::size_t{1} << axes_.size(); ++corner) {
+    // Along the last axis within the cell, then on its sides.
+    double way = 0;
+    std::size_t node = Corner(at, 0);
+    for (std::size_t a = axes_.size(); a-- > 0;) {
+      const std::size_t up = corner >> a & 1;
+      const double tick = axes_[a].ticks[at[a].first + up], z_a = at[a].lower;
+      way = AddUp(way, MulUp(axes_[a].slopes[node], std::max(SubUp(tick, z_a), SubUp(z_a, tick))));
+      node += up * axes_[a].stride;
+    }
+    reached_[0].push_back({AddUp(ceiling, way), node, id});
+    reached_[1].push_back({AddUp(-floor, way), node, id});
+  }
+}
+
+// Dijkstra: of two ways to a node the cheaper counts, each sum rounded up.
+void RegionTable::Spread(std::size_t side) {
+  const auto is_farther = [](const Reached& a, const Reached& b) { return a.value > b.value; };
+  std::priority_queue<Reached, std::vector<Reached>, decltype(is_farther)> queue(is_farther);
+  const auto reach = [&](const Reached& one) {
+    const auto& [value, node, source] = one;
+    if (!(value < kInfinity && value < values_[node][side])) return;  // no edge leads beyond the last node
+    values_[node][side] = value;
+    if (!sources_.empty()) sources_[node][side] = source;
+    largest_value_ = std::max(largest_value_, std::abs(value));
+    queue.push(one);
+  };
+  for (const Reached& one : reached_[side]) reach(one);
+  reached_[side].clear();
+  while (!queue.empty()) {
+    const auto [value, node, source] = queue.top();
+    queue.pop();
+    if (value > values_[node][side]) continue;
+    for (const Axis& axis : axes_) {
+      reach({AddUp(value, axis.costs[node]), node + axis.stride, source});
+      if (node >= axis.stride) reach({AddUp(value, axis.costs[node - axis.stride]), node - axis.stride, source});
     }
   }
+}
+
+void RegionTable::Spread() {
+  for (const std::size_t side : {0, 1}) Spread(side);
+  // 13 roundings at most, of terms that are no larger: docs/soundness.md, 3.20.
+  error_ = AddUp(MulUp(32 * kUnitRoundoff, AddUp(largest_value_, MulUp(3, largest_way_))), 0x1p-1060);
+}
+
+std::array<int, RegionTable::kMostSources> RegionTable::Sources(std::span<const double> z) const noexcept {
+  std::array<int, kMostSources> sources;
+  sources.fill(-1);
+  auto end = sources.begin();
+  if (Parts at; !sources_.empty() && CoverPoint(z, at))
+    for (std::size_t corner = 0; corner < std::size_t{1} << axes_.size(); ++corner)
+      for (const int source : sources_[Corner(at, corner)])
+        if (source >= 0 && std::find(sources.begin(), end, source) == end) *end++ = source;
+  return sources;
+}
+
+// On the faces at both ends of a cell along the last axis, then along it. A face is the same for both of its cells.
+template <std::size_t kAxes>
+RegionTable::Bounds RegionTable::OverInline(const Parts& parts, const Tilt& tilt) const noexcept {
+  constexpr std::size_t kAlong = kAxes - 1;
+  const Lanes infinity = AllLanes(kInfinity);
+  CellRow<kAxes> row{values_.data()};
+  std::array<std::size_t, kAxes> at;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    row.slopes[a] = axes_[a].slopes.data();
+    row.strides[a] = axes_[a].stride;
+    row.tilt[a] = Tilted(tilt.slope[a]);
+    at[a] = parts[a].first;
+  }
+  const auto taken_at = [&](std::size_t a, std::size_t tick) __attribute__((always_inline)) {
+    return row.tilt[a] * AllLanes(axes_[a].ticks[tick] - tilt.center[a]);
+  };
+  Lanes largest = -infinity;
+  for (bool is_last = false; !is_last;) {
+    std::size_t node = parts[kAlong].first;
+    for (std::size_t a = 0; a < kAlong; ++a) {
+      node += at[a] * row.strides[a];
+      row.taken[a] = {taken_at(a, at[a]), taken_at(a, at[a] + 1)};
+      row.Enter(a, &axes_[a].ticks[at[a]], parts[a].lower, parts[a].upper);
+    }
+    Lanes far = row.template Over<kAlong>(node, taken_at(kAlong, parts[kAlong].first));
+    for (std::size_t tick = parts[kAlong].first; tick <= parts[kAlong].last; ++tick, ++node) {
+      const Lanes near = far;
+      far = row.template Over<kAlong>(node + 1, taken_at(kAlong, tick + 1));
+      row.Enter(kAlong, &axes_[kAlong].ticks[tick], parts[kAlong].lower, parts[kAlong].upper);
+      const Lanes here = row.Between(kAlong, node, near, far);
+      largest = Max(here < infinity ? here : infinity, largest);  // what is no number bounds nothing
+    }
+    std::size_t next = kAlong;
+    while (next > 0 && at[next - 1] == parts[next - 1].last) --next, at[next] = parts[next].first;
+    is_last = next == 0;
+    if (!is_last) ++at[next - 1];
+  }
   double error = error_;
-  for (std::size_t a = 0; a < 2; ++a) {
+  for (std::size_t a = 0; a < kAxes; ++a) {
     const double width = axes_[a].ticks.back() - axes_[a].ticks.front();
     error = AddUp(error, MulUp(64 * kUnitRoundoff, MulUp(std::abs(tilt.slope[a]), width)));
   }
@@ -235,7 +314,11 @@ RegionTable::Bounds RegionTable::OverInline(const Parts& parts, const Tilt& tilt
 }
 
 RegionTable::Bounds RegionTable::Over(const Parts& parts, const Tilt& tilt) const noexcept {
-  return Dispatch<&RegionTable::OverInline>(instructions_, *this, parts, tilt);
+  switch (axes_.size()) {
+    case 1: return Dispatch<&RegionTable::OverInline<1>>(instructions_, *this, parts, tilt);
+    case 2: return Dispatch<&RegionTable::OverInline<2>>(instructions_, *this, parts, tilt);
+    default: return Dispatch<&RegionTable::OverInline<3>>(instructions_, *this, parts, tilt);
+  }
 }
 
 RegionTable::Bounds RegionTable::Enclose(const RegionGrid::Box& box, const Tilt& tilt) const noexcept {
@@ -260,10 +343,9 @@ RegionTable::Tilt RegionTable::TiltOver(const Parts& parts, std::span<const doub
     return Part{at, at, strip, strip};
   };
   Parts middle = parts;
-  for (std::size_t a = 0; a < 2; ++a)
-    if (axes_[a].variable >= 0) middle[a] = point(a, center[ToSize(axes_[a].variable)]);
+  for (std::size_t a = 0; a < axes_.size(); ++a) middle[a] = point(a, center[ToSize(axes_[a].variable)]);
   Tilt tilt{};
-  for (std::size_t a = 0; a < 2; ++a) {
+  for (std::size_t a = 0; a < axes_.size(); ++a) {
     const Axis& axis = axes_[a];
     if (!(axis.quantum > 0)) continue;
     const auto l = ToSize(axis.variable);

@@ -49,6 +49,12 @@ RegionalEnclosure::RegionalEnclosure(const Declaration& declaration, const Obser
     const auto i = static_cast<int>(static_cast<std::int64_t>(t) * observations.size() / tried);
     with_row(i, [&](auto z, auto lower, auto upper) { AddTested({i, PlaceOf(z, grid_)}, z, lower, upper); });
   }
+  SpreadAll();
+}
+
+void RegionalEnclosure::SpreadAll() {
+  for (std::optional<RegionTable>& table : tables_)
+    if (table) table->Spread();
 }
 
 void RegionalEnclosure::Add(int id, std::span<const double> z, std::span<const double> lower,
@@ -56,6 +62,7 @@ void RegionalEnclosure::Add(int id, std::span<const double> z, std::span<const d
   const RegionGrid::Box at = PlaceOf(z, grid_);
   TestBounds(id, at, lower, upper);
   AddTested({id, at}, z, lower, upper);
+  SpreadAll();
 }
 
 // What TestBounds has seen.
@@ -65,12 +72,13 @@ void RegionalEnclosure::AddTested(Kept one, std::span<const double> z, std::span
     const auto k = ToSize(grid_.rows()[i]);
     one.floor.push_back(SubDown(lower[k], error_[k]));
     one.ceiling.push_back(AddUp(upper[k], error_[k]));
-    if (tables_[i]) tables_[i]->Add(z, one.floor[i], one.ceiling[i]);
+    if (tables_[i]) tables_[i]->Add(one.id, z, one.floor[i], one.ceiling[i]);
   }
   if (!violation_) Test(one);
   bool narrows = false;
   for (std::size_t i = 0; i < grid_.rows().size() && !narrows; ++i) {
-    const Interval known = Bound(i, one.at, Interval::Entire());
+    Interval known = Interval::Entire();
+    for (const Kept& other : kept_) Narrow(i, other, one.at, known);
     narrows = one.floor[i] > known.lower || one.ceiling[i] < known.upper;
   }
   if (!narrows) return;
@@ -111,17 +119,14 @@ void RegionalEnclosure::TestBounds(int id, const RegionGrid::Box& at, std::span<
   }
 }
 
-// `bounds` narrowed by what is kept.
-Interval RegionalEnclosure::Bound(std::size_t row, const RegionGrid::Box& to, Interval bounds) const noexcept {
-  for (const Kept& one : kept_) {
-    const double floor = one.floor[row], ceiling = one.ceiling[row];
-    if (!(floor > bounds.lower) && !(ceiling < bounds.upper)) continue;
-    const double enough = std::max(floor - bounds.lower, bounds.upper - ceiling);  // rounded: it only saves time
-    const double cost = grid_.CostUpper(row, one.at, to, enough);
-    bounds.lower = std::max(bounds.lower, SubDown(floor, cost));
-    bounds.upper = std::min(bounds.upper, AddUp(ceiling, cost));
-  }
-  return bounds;
+void RegionalEnclosure::Narrow(std::size_t row, const Kept& one, const RegionGrid::Box& to,
+                               Interval& bounds) const noexcept {
+  const double floor = one.floor[row], ceiling = one.ceiling[row];
+  if (!(floor > bounds.lower) && !(ceiling < bounds.upper)) return;
+  const double enough = std::max(floor - bounds.lower, bounds.upper - ceiling);  // rounded: it only saves time
+  const double cost = grid_.CostUpper(row, one.at, to, enough);
+  bounds.lower = std::max(bounds.lower, SubDown(floor, cost));
+  bounds.upper = std::min(bounds.upper, AddUp(ceiling, cost));
 }
 
 void RegionalEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept {
@@ -145,11 +150,20 @@ void RegionalEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds) c
   }
   for (std::size_t i = 0; i < grid_.rows().size(); ++i) {
     const auto k = ToSize(grid_.rows()[i]);
-    const Interval known{bounds.lower[k], bounds.upper[k]};
-    const RegionTable::Bounds found =
-        tables_[i] ? tables_[i]->EncloseTilted(hull, center) : RegionTable::Bounds{.plain = Bound(i, hull, known)};
-    bounds.lower[k] = std::max(known.lower, found.plain.lower);
-    bounds.upper[k] = std::min(known.upper, found.plain.upper);
+    Interval known{bounds.lower[k], bounds.upper[k]};
+    RegionTable::Bounds found;
+    if (tables_[i]) {
+      found = tables_[i]->EncloseTilted(hull, center);
+      known = {std::max(known.lower, found.plain.lower), std::min(known.upper, found.plain.upper)};
+      for (const int id : tables_[i]->Sources(center)) {
+        if (id < 0) break;
+        if (const Kept* one = Find(id)) Narrow(i, *one, hull, known);
+      }
+    } else {
+      for (const Kept& one : kept_) Narrow(i, one, hull, known);
+    }
+    bounds.lower[k] = known.lower;
+    bounds.upper[k] = known.upper;
     Tilt(query, k, found, bounds);
   }
 }
@@ -157,8 +171,8 @@ void RegionalEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds) c
 // Relative to a slope where that is much narrower.
 void RegionalEnclosure::Tilt(const QuerySet& query, std::size_t k, const RegionTable::Bounds& found,
                              ResidualBounds& bounds) const noexcept {
-  const std::array<double, 2>& slope = found.tilt.slope;
-  if (slope[0] == 0 && slope[1] == 0) return;
+  const auto& slope = found.tilt.slope;
+  if (std::ranges::count(slope, 0) == std::ssize(slope)) return;
   double width = found.tilted.upper - found.tilted.lower;
   for (std::size_t a = 0; a < grid_.variables().size(); ++a)
     if (slope[a] != 0) width += kOfSlope * 2 * std::abs(slope[a]) * query.half_width[ToSize(grid_.variables()[a])];
@@ -173,7 +187,10 @@ void RegionalEnclosure::Tilt(const QuerySet& query, std::size_t k, const RegionT
     if (slope[a] != 0) bounds.slope[k][ToSize(grid_.variables()[a])] = slope[a];
 }
 
-bool RegionalEnclosure::Keeps(int id) const { return std::ranges::find(kept_, id, &Kept::id) != kept_.end(); }
+const RegionalEnclosure::Kept* RegionalEnclosure::Find(int id) const noexcept {
+  const auto at = std::ranges::lower_bound(kept_, id, {}, &Kept::id);
+  return at != kept_.end() && at->id == id ? &*at : nullptr;
+}
 
 std::optional<Violation> FindRegionalViolation(const Declaration& declaration, const Observations& observations,
                                                std::span<const double> domain_lower,

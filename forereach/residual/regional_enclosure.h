@@ -1,8 +1,9 @@
 /** The enclosure of a residual that changes less in some regions of the domain (Declaration::regions):
     max_i [r~_ik - eps_k - D_i(z)] <= r_k(z) <= min_i [r~_ik + eps_k + D_i(z)]   for every z in the hull of Z,
 with D_i(z) the cost of a path from observation i. A row that a table fits (region_table.h) looks up the largest of
-these bounds over the hull, and takes them relative to a slope where they are narrower so; another takes for D_i the
-largest cost over it (RegionGrid::CostUpper). They are intersected with the bounds on |r_k| of the regions that the hull
+these bounds over the hull, and takes them relative to a slope where they are narrower so. A row without a table takes
+for D_i the largest cost over the hull (RegionGrid::CostUpper), and so does, beside it, a table in three variables for
+its sources. They are intersected with the bounds on |r_k| of the regions that the hull
 meets, and with those of another enclosure, which knows L alone: that sees the zonotope, this one its hull.
 
 Work. Any subset of the observations gives sound bounds. Tables know each that is added. Kept for the rest, and for
@@ -36,11 +37,12 @@ class RegionalEnclosure final : public ResidualEnclosure {
                     const ResidualEnclosure& others);
 
   /** Cost, in each row of RegionGrid::rows(): RegionTable::EncloseTilted, or RegionGrid::CostUpper for each observation
-  that is kept and may narrow a bound. */
+  that is kept and may narrow a bound; with three variables both, for up to RegionTable::kMostSources of them. */
   void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
 
   /** Adds an observation, and tests it against those that are kept; the rest is not to be called meanwhile. Cost:
-  RegionGrid::CostUpper for each of these, and RegionTable::Add: milliseconds where it narrows all of a table.
+  RegionGrid::CostUpper for each of these, and RegionTable::Spread: milliseconds where it narrows all of a table.
+  @param id above those of before.
   @param lower, upper n entries: enclosures of the observed residual. */
   void Add(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
 
@@ -49,7 +51,7 @@ class RegionalEnclosure final : public ResidualEnclosure {
   the first observation found that contradicts a region's bound by itself; none of these is missed. */
   [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
   [[nodiscard]] const RegionGrid& grid() const { return grid_; }
-  [[nodiscard]] bool Keeps(int id) const;
+  [[nodiscard]] bool Keeps(int id) const { return Find(id) != nullptr; }
 
  private:
   struct Kept {
@@ -58,10 +60,12 @@ class RegionalEnclosure final : public ResidualEnclosure {
     std::vector<double> floor = {}, ceiling = {};  // r~ -+ eps rounded outward, of grid_.rows()
   };
 
+  [[nodiscard]] const Kept* Find(int id) const noexcept;
+  void SpreadAll();
   void AddTested(Kept one, std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
   void Tilt(const QuerySet& query, std::size_t k, const RegionTable::Bounds& found,
             ResidualBounds& bounds) const noexcept;
-  [[nodiscard]] Interval Bound(std::size_t row, const RegionGrid::Box& to, Interval bounds) const noexcept;
+  void Narrow(std::size_t row, const Kept& one, const RegionGrid::Box& to, Interval& bounds) const noexcept;
   void Test(const Kept& one);
   void TestBounds(int id, const RegionGrid::Box& at, std::span<const double> lower, std::span<const double> upper);
 

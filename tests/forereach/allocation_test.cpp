@@ -154,8 +154,11 @@ TEST_F(Allocation, CertifyAllocatesNothingForRegions) {
   declaration.disturbance = Eigen::VectorXd::Constant(6, 1e-4);
   const Eigen::VectorXd less = 0.5 * declaration.disturbance;
   declaration.regions = {{{{4, {-4, 0}}, {5, {-1, 0}}}, 0.5 * declaration.lipschitz, less, {}, less}};
-  certifier_.emplace(std::make_shared<Problem>(problem));
-  EXPECT_EQ(Count(10, 0, {}, Outcome::kCertified), 0);
+  for (const bool has_table : {false, true}) {
+    if (has_table) declaration.regions[0].box.push_back({3, {-1, 30}});
+    certifier_.emplace(std::make_shared<Problem>(problem));
+    EXPECT_EQ(Count(10, 0, {}, Outcome::kCertified), 0);
+  }
 }
 
 TEST_F(Allocation, ABatchAllocatesNothingForAStep) {

@@ -63,6 +63,23 @@ TEST_F(Regions, LeaveATubeAsTightAsTheNominalModelWhereTheResidualIsConstant) {
   EXPECT_GT(tube_.half_width(8)[2], 0.5);
 }
 
+// A step from 3 m/s and one from 7 differ by as much as L allows, so the residual is affine between them.
+TEST_F(Regions, ThatCoverTheDomainKeepTheSlopeThatDataShow) {
+  Problem problem = SlippingPointMass();
+  Append(problem, 3, 0);
+  Append(problem, 7, -0.05 * 4 * (1 - 2e-9));
+  const auto width = [&](std::vector<Region> regions) {
+    problem.declaration.regions = std::move(regions);
+    EXPECT_EQ(Certify(Certifier(SharedOf(problem)), 5).outcome, Outcome::kCertified);
+    return tube_.half_width(8)[2];
+  };
+  const double plain = width({}),
+               sloped = width({{{{2, {-9, 9}}}, (1 - 1e-9) * SlippingPointMass().declaration.lipschitz}});
+  EXPECT_TRUE(tube_.step(0).envelope.has_slope);
+  EXPECT_NEAR(sloped, 0.125 * std::pow(0.95, 8), 1e-6);
+  EXPECT_NEAR(plain, 0.125 * std::pow(1.05, 8), 1e-6);
+}
+
 TEST_F(Regions, AreContradictedByTwoStepsThatLAllows) {
   Problem problem = SlippingPointMass();
   Append(problem, 2, 0.05);

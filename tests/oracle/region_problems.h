@@ -176,8 +176,9 @@ inline std::vector<int> VariablesOf(const Declaration& declaration, int k) {
   return variables;
 }
 
-/** AnyProblem with regions in one or two variables, larger slopes in these, at most one other slope in a row, and data
-from a residual within; some regions bound it, its records and, if `disturbed`, its disturbance. */
+/** AnyProblem with regions in one to three variables, larger slopes in these, at most one other slope in a row, none
+beside three, and data from a residual within; some regions bound it, its records and, if `disturbed`, its disturbance.
+*/
 inline std::shared_ptr<Problem> AnyRegionalProblem(Random& random, bool bicycle, int count, bool disturbed) {
   const auto problem = AnyProblem(random, bicycle, count);
   problem->domain.balls.clear();
@@ -186,8 +187,9 @@ inline std::shared_ptr<Problem> AnyRegionalProblem(Random& random, bool bicycle,
   const auto [lower, upper] = problem->domain.Corners();
   std::vector<int> chosen{bicycle ? 3 : 2};
   if (random.Coin()) chosen.push_back(random.Coin() ? chosen[0] + 1 : d - 1);
+  if (chosen.size() == 2 && random.Coin()) chosen.insert(chosen.begin(), 0);
   for (int k = 0; k < n; ++k) {
-    const int other = random.Below(d);
+    const int other = chosen.size() == 3 ? 0 : random.Below(d);
     for (int l = 0; l < d; ++l)
       if (l != other) declaration.lipschitz(k, l) = 0;
     for (const int l : chosen)

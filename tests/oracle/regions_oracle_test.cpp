@@ -234,6 +234,10 @@ struct Tabled {
         grid(declaration, lower, upper),
         table(grid, 0, lower, upper) {}
 
+  void Add(std::span<const double> z, double floor, double ceiling) {
+    table.Add(0, z, floor, ceiling);
+    table.Spread();
+  }
   Interval Over(const std::vector<double>& from, const std::vector<double>& to) const {
     RegionGrid::Box box;
     std::ranges::copy(from, box.lower.begin());
@@ -261,7 +265,7 @@ TEST(RegionsOracle, TheTableHoldsRelativeToEverySlope) {
     for (const auto z : scene.observations.z.rowwise()) {
       const Eigen::VectorXd at = z;
       const Rational value = truth({at.begin(), at.end()});
-      tabled.table.Add({at.data(), d}, exact::Floor(value), exact::Ceiling(value));
+      tabled.Add({at.data(), d}, exact::Floor(value), exact::Ceiling(value));
     }
     for (int query = 0; query < 10; ++query) {
       RegionGrid::Box box;
@@ -299,7 +303,7 @@ TEST(RegionTable, TakesTheSlopeThatDataShow) {
   Declaration declaration{Eigen::MatrixXd{{1}}, Eigen::VectorXd::Zero(1)};
   declaration.regions = {{{{0, {-2, 0}}}, Eigen::MatrixXd::Zero(1, 1)}};
   Tabled tabled(declaration, 2);
-  for (const double at : {0.0, 1.5}) tabled.table.Add(std::vector<double>{at}, at, at);
+  for (const double at : {0.0, 1.5}) tabled.Add(std::vector<double>{at}, at, at);
   RegionGrid::Box box;
   const auto slope_over = [&](double lower, double upper) {
     box.lower[0] = lower, box.upper[0] = upper;
@@ -329,7 +333,7 @@ TEST(RegionTable, KnowsWaysAroundCorners) {
   Tabled tabled(SteepAboveCalm(1), 2);
   ASSERT_TRUE(RegionTable::Fits(tabled.grid, 0));
   EXPECT_EQ(tabled.Over({1, 1}, {1, 1}).upper, kInfinity) << "nothing is known";
-  tabled.table.Add(std::vector<double>{-1, 1}, 0.5, 0.5);
+  tabled.Add(std::vector<double>{-1, 1}, 0.5, 0.5);
   const Interval across = tabled.Over({1, 1}, {1, 1}), calm = tabled.Over({-2, -2}, {2, -1});
   EXPECT_GE(across.upper, 1.5) << "down, across and up";
   EXPECT_LT(across.upper, 1.55) << "2.5 by moves along the axes";
@@ -338,16 +342,82 @@ TEST(RegionTable, KnowsWaysAroundCorners) {
   EXPECT_LT(calm.upper, 1.03);
   EXPECT_LT(tabled.Over({1, -1}, {1, -1}).upper, 1.03) << "on the side";
   EXPECT_LE(tabled.Over({1, 1}, {1, 1}).upper, tabled.Over({0.5, 0.5}, {1, 1.5}).upper) << "a larger box";
-  tabled.table.Add(std::vector<double>{1, 1.5}, 0.75, 0.75);
+  tabled.Add(std::vector<double>{1, 1.5}, 0.75, 0.75);
   EXPECT_NEAR(tabled.Over({1, 1}, {1, 1}).upper, 0.875, 0.03) << "another one is nearer";
+}
+
+// By L it is far along x and y, and near along z to where these cost nothing.
+TEST(RegionTable, KnowsWaysAroundCornersInThreeVariables) {
+  Declaration declaration{Eigen::Matrix3d{{1, 1, 0.25}, {0, 0, 0}, {0, 0, 0}}, Eigen::Vector3d::Zero()};
+  declaration.regions = {{{{0, {-2, 2}}, {1, {-2, 2}}, {2, {-2, -1}}}, Eigen::Matrix3d::Zero()}};
+  Tabled tabled(declaration, 2);
+  ASSERT_TRUE(RegionTable::Fits(tabled.grid, 0));
+  const auto sources = [&](std::vector<double> z) {
+    const auto found = tabled.table.Sources(z);
+    return std::vector<int>(found.begin(), std::ranges::find(found, -1));
+  };
+  EXPECT_TRUE(sources({1, 1, 1}).empty()) << "nothing is known";
+  tabled.table.Add(7, std::vector<double>{-1, -1, 1}, 0.5, 0.5);
+  EXPECT_EQ(tabled.Over({1, 1, 1}, {1, 1, 1}).upper, kInfinity) << "not before it has spread";
+  tabled.table.Spread();
+  const Interval across = tabled.Over({1, 1, 1}, {1, 1, 1});
+  EXPECT_GE(across.upper, 1.5) << "down, across and up";
+  EXPECT_LT(across.upper, 1.65) << "4.5 by moves along the axes";
+  EXPECT_NEAR(across.upper + across.lower, 1, 1e-13) << "as far below as above";
+  EXPECT_NEAR(tabled.Over({-2, -2, -2}, {2, 2, -1}).upper, 1, 1e-13) << "down to the side of the calm region";
+  EXPECT_EQ(sources({1, 1, 1}), std::vector{7});
+  tabled.table.Add(9, std::vector<double>{1, 1, 1}, 0.25, 0.25);
+  tabled.table.Spread();
+  EXPECT_EQ(sources({1, 1, 1}), std::vector{9});
+  EXPECT_EQ(sources({-1, -1, 1}), std::vector{7}) << "at most 0.5 and at least 0.5";
+  EXPECT_TRUE(sources({1, 1, NextUp(2)}).empty());
+  EXPECT_TRUE(sources({1, std::nan(""), 1}).empty());
+  EXPECT_NEAR(tabled.Over({-2, -2, -2}, {2, 2, -1}).upper, 0.75, 1e-13) << "from the other one it is as near";
+}
+
+// However wide the strips are.
+TEST(RegionsOracle, InThreeVariablesAnObservationSaysAsMuchAsByItself) {
+  int less = 0, same = 0;
+  for (TracedRandom random(2107); random.Again(200);) {
+    SCOPED_TRACE("trial " + std::to_string(random.trial()));
+    Scene scene = AnyScene(random);
+    const RegionGrid grid(scene.declaration, scene.lower, scene.upper);
+    if (grid.rows().empty() || grid.variables().size() < 3) continue;
+    scene.observations = {Eigen::MatrixXd(1, 3), Eigen::MatrixXd::Zero(1, 3), Eigen::MatrixXd::Zero(1, 3)};
+    RegionGrid::Box from, to;
+    for (int l = 0; l < 3; ++l)
+      from.lower[ToSize(l)] = from.upper[ToSize(l)] = scene.observations.z(0, l) = AnyPlace(random);
+    grid.Find(from);
+    const Nothing nothing;
+    const RegionalEnclosure regional(scene.declaration, scene.observations, scene.lower, scene.upper, nothing);
+    for (int query = 0; query < 5; ++query) {
+      Eigen::Vector3d center, width;
+      for (int l = 0; l < 3; ++l) {
+        center[l] = AnyPlace(random);
+        width[l] = random.Coin(0.3) ? 0 : random.Uniform(0, 0.2) * (kReach - std::abs(center[l]));
+        to.lower[ToSize(l)] = SubDown(center[l], width[l]);
+        to.upper[ToSize(l)] = AddUp(center[l], width[l]);
+      }
+      grid.Find(to);
+      ResidualBounds bounds;
+      regional.Enclose({Zonotope::FromBox(center, width), {}, {width.data(), 3}}, bounds);
+      const double cost = grid.CostUpper(0, from, to);
+      ASSERT_LE(bounds.upper[0], cost);
+      ASSERT_GE(bounds.lower[0], -cost);
+      less += bounds.upper[0] < 0.9 * cost;
+      same += bounds.upper[0] == cost;
+    }
+  }
+  EXPECT_GT(less, 10) << "by ways around corners";
+  EXPECT_GT(same, 50);
 }
 
 TEST(RegionTable, HasNoBoundOutsideTheDomain) {
   Tabled tabled(SteepAboveCalm(1), 2);
-  tabled.table.Add(std::vector<double>{0, NextUp(2)}, 0, 0);
-  tabled.table.Add(std::vector<double>{std::nan(""), 0}, 0, 0);
+  tabled.Add(std::vector<double>{0, NextUp(2)}, 0, 0);
+  tabled.Add(std::vector<double>{std::nan(""), 0}, 0, 0);
   EXPECT_EQ(tabled.Over({0, 0}, {0, 0}).lower, -kInfinity) << "an observation outside says nothing";
-  tabled.table.Add(std::vector<double>{-2, 2}, 0, 0);
+  tabled.Add(std::vector<double>{-2, 2}, 0, 0);
   EXPECT_TRUE(tabled.Over({-2, -2}, {2, 2}).IsFinite());
   EXPECT_LT(tabled.Over({-2, 2}, {-2, 2}).upper, 1e-14) << "in a corner";
   EXPECT_TRUE(tabled.Over({-3, -3}, {3, 3}).IsFinite()) << "the part of it in the domain";
@@ -367,8 +437,8 @@ TEST(RegionTable, IsTheSameInEveryOrderOfObservations) {
       value = random.Uniform(-1, 1);
     }
     Tabled forward(scene.declaration, kReach), backward(scene.declaration, kReach);
-    for (const auto& [z, value] : seen) forward.table.Add(z, value, value + 0.5);
-    for (auto at = seen.rbegin(); at != seen.rend(); ++at) backward.table.Add(at->first, at->second, at->second + 0.5);
+    for (const auto& [z, value] : seen) forward.Add(z, value, value + 0.5);
+    for (auto at = seen.rbegin(); at != seen.rend(); ++at) backward.Add(at->first, at->second, at->second + 0.5);
     for (int query = 0; query < 10; ++query) {
       std::vector<double> from, to;
       for (int l = 0; l < scene.variables; ++l) {
@@ -386,7 +456,7 @@ TEST(RegionTable, IsTheSameInEveryOrderOfObservations) {
 TEST(RegionTable, HoldsInDomainsOfEveryScale) {
   for (const double scale : {0x1p-1000, 0x1p-500, 0x1p500, 0x1p1020}) {
     Tabled tabled(SteepAboveCalm(scale), 2 * scale);
-    tabled.table.Add(std::vector<double>{-scale, scale}, 0.5, 0.5);
+    tabled.Add(std::vector<double>{-scale, scale}, 0.5, 0.5);
     const Interval bounds = tabled.Over({scale, scale}, {scale, scale});
     EXPECT_GE(bounds.upper, 1.5) << scale;
     EXPECT_LE(bounds.lower, -0.5) << scale;

@@ -76,16 +76,17 @@ TEST(Nodes, BoundWhatTheTableSays) {
     const RegionGrid grid(problem->declaration, lower, upper);
     const Ways ways(*problem);
     for (std::size_t i = 0; i < grid.rows().size(); ++i) {
-      ASSERT_EQ(RegionTable::Fits(grid, i), !ways.Plane(grid.rows()[i]).empty());
+      ASSERT_EQ(RegionTable::Fits(grid, i), !ways.Axes(grid.rows()[i]).empty());
       if (!RegionTable::Fits(grid, i)) continue;
       RegionTable table(grid, i, lower, upper);
       Nodes nodes(ways, grid.rows()[i]);
       for (int one = 0; one < 3; ++one) {
         const Eigen::VectorXd z = problem->transitions.z.row(one);
         const double value = random.Uniform(-0.1, 0.1);
-        table.Add({z.data(), lower.size()}, value, value);
+        table.Add(one, {z.data(), lower.size()}, value, value);
         nodes.Add(z, value, value);
       }
+      table.Spread();
       nodes.Spread();
       for (int query = 0; query < 5; ++query) {
         RegionGrid::Box box;
