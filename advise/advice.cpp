@@ -36,7 +36,7 @@ struct Judgement {
 Judgement JudgeBy(const Certifier& certifier, const Case& judged, Tube& tube) {
   certifier.Require(judged.plan(), judged.initial_set, judged.obstacles);
   const Decision decision = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
-  return {decision, Explain(decision, *judged.problem, judged.obstacles, judged.plan(), tube)};
+  return {decision, Explain(decision, certifier, judged.obstacles, judged.plan(), tube)};
 }
 
 // A change that no certifier accepts turns nothing.

@@ -456,7 +456,7 @@ class Examination final {
       return;
     }
     if (certifier->violation()) {
-      if (certifier->violation()->second != -1) ExplainViolation(*certifier->violation());  // else ExamineRates did
+      if (certifier->violation()->second != -1) ExplainViolation(*certifier);  // else ExamineRates did
       return;
     }
     RemarkOnSlack();
@@ -465,7 +465,7 @@ class Examination final {
                  "record steps that vary it, or leave a column out on which the residual does not depend");
     Tube tube;
     const Decision decision = certifier->Certify(plan, initial_set, {}, tube);
-    result_.tube = Explain(decision, certifier->problem(), {}, plan, tube);
+    result_.tube = Explain(decision, *certifier, {}, plan, tube);
     for (int t = 0; t <= tube.length(); ++t) {
       const Zonotope& slice = tube.slice(t);
       std::vector<double>& widths = result_.half_widths.emplace_back();
@@ -524,7 +524,8 @@ class Examination final {
   }
 
   // Of a pair, or of one step in a region, that contradicts the declaration.
-  void ExplainViolation(const Violation& violation) {
+  void ExplainViolation(const Certifier& certifier) {
+    const Violation& violation = *certifier.violation();
     const auto k = ToSize(violation.coordinate);
     const std::string& name = result_.states[k];
     if (const int region = Violation::RegionOf(violation.second); region >= 0)
@@ -534,18 +535,21 @@ class Examination final {
                       "false, and nothing can be certified",
                       FileLine(violation.first), result_.data, Down(violation.difference), ToText(violation.bound)),
           "look at this line. If it is right, declare more, or end the box before it");
-    if (problem_.declaration.affine.Contains(violation.coordinate))
+    if (problem_.declaration.affine.Contains(violation.coordinate)) {
+      std::vector<int> lines;
+      for (const int i : certifier.Contradicting()) lines.push_back(FileLine(i));
       return Add(
           "declaration.affine",
-          fmt::format("{}: no affine residual agrees with a few lines of {}, {} and {} among them: {}. The declaration "
-                      "is false, and nothing can be certified",
-                      name, result_.data, FileLine(violation.first), FileLine(violation.second),
+          fmt::format("{}: no affine residual agrees with lines {} of {}: {}. The declaration is false, and nothing "
+                      "can be certified",
+                      name, fmt::join(lines, ", "), result_.data,
                       violation.bound > 0
                           ? fmt::format("one of its slopes is {} at least, declaration.lipschitz says {} at most",
                                         Down(violation.difference), ToText(violation.bound))
                           : fmt::format("one is {} off what the others allow", Down(violation.difference))),
           "look at these lines, and whether model.dt is the step of the data. If they are right, bound this row "
           "by declaration.lipschitz, or declare more noise_bound");
+    }
     const auto z = [&](int i) { return problem_.transitions.z.row(i); };
     const double by_slopes = 2 * problem_.declaration.ObservationError(violation.coordinate) +
                              problem_.declaration.lipschitz.row(violation.coordinate)
@@ -678,7 +682,7 @@ class Examination final {
     const Decision decision = certifier.Certify(plan, initial_set, {}, tube);
     if (decision.cause == Cause::kLimit)
       Add(fmt::format("task.limits[{}]", decision.coordinate),
-          fmt::format("the tube of {}: {}", PlanName(), Explain(decision, *problem, {}, plan, tube)),
+          fmt::format("the tube of {}: {}", PlanName(), Explain(decision, certifier, {}, plan, tube)),
           "change the start or the plan, raise the bound, or make the tube narrower",
           decision.step >= StepsThatCount());
   }

@@ -61,7 +61,7 @@ AbstentionAdvice AdviceFor(const RecordedAbstention& abstention, const BrakingTa
     const Decision again = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
     if (static_cast<std::int16_t>(again.outcome) != abstention.outcome)
       advice.missing = fmt::format("judged again by what is recorded: {}",
-                                   Explain(again, *judged.problem, judged.obstacles, judged.plan(), tube));
+                                   Explain(again, certifier, judged.obstacles, judged.plan(), tube));
     if (with_inner) advice.inner = BoundFromWithin(judged, certifier, tube);
     return advice;
   } catch (const std::invalid_argument& error) {

@@ -38,7 +38,7 @@ void PrintLimits(const Plan& plan, const Tube& tube, const Certifier& certifier)
 
 void PrintForPeople(const CertifyResult& result, const Plan& plan, const Tube& tube, const Certifier& certifier,
                     const Config& config) {
-  std::cout << Explain(result.decision, certifier.problem(), config.obstacles, plan, tube) << "\n";
+  std::cout << Explain(result.decision, certifier, config.obstacles, plan, tube) << "\n";
   const auto& names = certifier.problem().model->state_names();
   if (result.decision.outcome == Outcome::kFalsified && result.decision.step < 0) {
     std::cout << "  no tube";
@@ -66,7 +66,7 @@ Picture PictureOf(const Decision& decision, const Plan& plan, const Tube& tube, 
                   const Config& config) {
   const Problem& problem = certifier.problem();
   Picture picture;
-  picture.title = Explain(decision, problem, config.obstacles, plan, tube);
+  picture.title = Explain(decision, certifier, config.obstacles, plan, tube);
   picture.obstacles = config.obstacles;
   const Eigen::VectorXd start = (config.initial_set.lower() + config.initial_set.upper()) / 2;
   picture.bodies = BodyAt(problem, start);

@@ -82,7 +82,7 @@ Judgements JudgingTask::Certify(std::vector<Eigen::MatrixXd> plans, std::vector<
                                         all[i]->decision = decision;
                                         all[i]->num_learned = learned_.size();
                                         all[i]->message =
-                                            Explain(decision, *config_.problem, config_.obstacles, views[i], tube);
+                                            Explain(decision, certifier_, config_.obstacles, views[i], tube);
                                         all[i]->tube = NumbersOf(decision, tube, model().num_states());
                                       } catch (...) {
                                         const std::lock_guard guard(failing);

@@ -169,7 +169,7 @@ nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certi
   document["capped"] = decision.capped;
   const auto inputs = static_cast<int>(result.controls.rows());
   const Plan plan{result.controls.data(), inputs, static_cast<int>(result.controls.cols()), inputs, result.schedule};
-  document["message"] = Explain(decision, certifier.problem(), config.obstacles, plan, tube);
+  document["message"] = Explain(decision, certifier, config.obstacles, plan, tube);
   document["inputs"] = InputsJson(result, config);
   document["tube"] = before_any_step ? Json::array() : TubeJson(tube, certifier, config.obstacles, result.schedule);
   document["digests"] = {{"plan", ToHex(PlanDigest(result.controls, config.initial_set))},

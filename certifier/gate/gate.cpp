@@ -354,7 +354,7 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
   decision.second_observation = verdict.second_observation;
   decision.margin = verdict.margin;
   decision.threshold = verdict.threshold;
-  const std::string sentence = Explain(verdict, certifier_.problem(), obstacles_.all(), plan, *tube_) + how;
+  const std::string sentence = Explain(verdict, certifier_, obstacles_.all(), plan, *tube_) + how;
   SetText(decision.message, sentence);
   if (verdict.outcome != Outcome::kCertified) return;
   // In shadow mode no certificate is made, so none can be taken for one (docs/decisions.md).

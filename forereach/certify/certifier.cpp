@@ -201,6 +201,14 @@ void Certifier::TestRates() {
   if (!violation_) violation_ = too_fast_;
 }
 
+std::vector<int> Certifier::Contradicting() const {
+  const AffineContradiction* const found = observed_ ? observed_->affine_contradiction() : nullptr;
+  std::vector<int> ids = found ? found->rows : std::vector{violation_->first, violation_->second};
+  std::erase_if(ids, [](int id) { return id < 0; });
+  std::ranges::sort(ids);
+  return ids;
+}
+
 Transitions Certifier::Contradiction() const {
   const Transitions& given = problem_->transitions;
   Transitions rows{Eigen::MatrixXd(0, given.z.cols()), Eigen::MatrixXd(0, given.x_next.cols())};
@@ -212,12 +220,7 @@ Transitions Certifier::Contradiction() const {
     rows.z.row(row) = z, rows.x_next.row(row) = next, rows.longer[row] = longer;
     rows.num_learned += is_learned ? 1 : 0;
   };
-  const auto [first, second] = std::minmax(violation_->first, violation_->second);
-  std::vector<int> ids{first, second};
-  if (const AffineContradiction* const found = observed_ ? observed_->affine_contradiction() : nullptr)
-    ids = found->rows, std::ranges::sort(ids);
-  for (const int id : ids) {
-    if (id < 0) continue;
+  for (const int id : Contradicting()) {
     if (id < given.size()) {
       add(given.z.row(id), given.x_next.row(id), given.Longer(id), given.IsLearned(id));
     } else if (const auto found_id = std::ranges::lower_bound(learned_ids_, id);

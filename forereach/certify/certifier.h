@@ -51,8 +51,11 @@ class Certifier final {
   /** Why an affine row of the residual has no bound: the direction in which the observations do not vary. Empty if all
   rows have one. */
   [[nodiscard]] std::string Unexcited() const;
-  /** The transitions of violation(), one, two or, of an affine row, all that decide it, as they were recorded, whatever
-  is declared of them; of learned ones `longer` is that of their clock. @pre violation() has a value. */
+  /** The observations of violation(), ascending: one, two or, of an affine row, all that decide it. @pre violation()
+  has a value. */
+  [[nodiscard]] std::vector<int> Contradicting() const;
+  /** These transitions as they were recorded, whatever is declared of them; of learned ones `longer` is that of their
+  clock. @pre as above. */
   [[nodiscard]] Transitions Contradiction() const;
   [[nodiscard]] std::size_t num_observations() const { return observed_ ? observed_->known.size() : 0; }
   /** True if some row of L has too many nonzero columns for the exact set-to-sample distance. */

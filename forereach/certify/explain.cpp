@@ -49,6 +49,21 @@ std::string BoxText(const std::vector<Region>& regions, int i, const NominalMode
   return text;
 }
 
+// What observations show of an affine row, not what the step finds empty.
+bool IsOfAffineRow(const Decision& decision, const Problem& problem) {
+  return decision.outcome == Outcome::kFalsified && decision.cause == Cause::kPairwise &&
+         decision.first_observation >= 0 && problem.declaration.affine.Contains(decision.coordinate);
+}
+
+std::string ExplainAffine(const Decision& decision, const Problem& problem, const std::string& observations) {
+  return "abstain F: no affine residual of " + VariableName(*problem.model, decision.coordinate) + " agrees with " +
+         observations + ": " +
+         (decision.threshold > 0
+              ? "one of its slopes is " + RoundedDown(decision.margin) + " at least, declaration.lipschitz says " +
+                    ToText(decision.threshold) + " at most"
+              : "one is " + RoundedDown(decision.margin) + " off what the others allow");
+}
+
 std::string ExplainFalsified(const Decision& decision, const Problem& problem) {
   const std::string coordinate = VariableName(*problem.model, decision.coordinate);
   if (const int region = Violation::RegionOf(decision.second_observation);
@@ -61,14 +76,10 @@ std::string ExplainFalsified(const Decision& decision, const Problem& problem) {
     return "abstain F: in transition " + std::to_string(decision.first_observation) + " " + coordinate +
            " changes by at least " + RoundedDown(decision.margin) + " a second, " +
            KeyOfRate(problem, decision.coordinate) + " declares " + ToText(decision.threshold) + " at most";
-  if (problem.declaration.affine.Contains(decision.coordinate) && decision.first_observation >= 0)
-    return "abstain F: no affine residual of " + coordinate + " agrees with a few observations, " +
-           std::to_string(decision.first_observation) + " and " + std::to_string(decision.second_observation) +
-           " among them: " +
-           (decision.threshold > 0
-                ? "one of its slopes is " + RoundedDown(decision.margin) + " at least, declaration.lipschitz says " +
-                      ToText(decision.threshold) + " at most"
-                : "one is " + RoundedDown(decision.margin) + " off what the others allow");
+  if (IsOfAffineRow(decision, problem))
+    return ExplainAffine(decision, problem,
+                         "a few observations, " + std::to_string(decision.first_observation) + " and " +
+                             std::to_string(decision.second_observation) + " among them");
   if (decision.first_observation < 0)
     return "abstain F: at step " + std::to_string(decision.step) + " no residual in " + coordinate +
            " agrees with all observations and the declaration";
@@ -132,9 +143,12 @@ std::string Sentence(const Decision& decision, const Problem& problem, std::span
 }
 
 // Why there is no finite enclosure; empty if it is not known.
-std::string ExplainUnbounded(const Decision& decision, const NominalModel& model, const Plan& plan, const Tube& tube) {
+std::string ExplainUnbounded(const Decision& decision, const Certifier& certifier, const Plan& plan, const Tube& tube) {
+  const NominalModel& model = *certifier.problem().model;
   const int t = decision.step;
   if (decision.cause != Cause::kNoFiniteEnclosure || t < 0 || t > tube.length() || t >= plan.num_steps) return "";
+  if (certifier.problem().declaration.affine.Contains(decision.coordinate))
+    if (const std::string why = certifier.Unexcited(); !why.empty()) return ": " + why;
   std::vector<Interval> box;
   for (int k = 0; k < model.num_states(); ++k) box.push_back(tube.hull(t, k));
   for (const double u : plan.input(t)) box.emplace_back(u);
@@ -198,9 +212,16 @@ std::string Explain(const Decision& decision, const Problem& problem, std::span<
   return Sentence(decision, problem, obstacles) + (decision.capped ? kCapped : "");
 }
 
-std::string Explain(const Decision& decision, const Problem& problem, std::span<const Obstacle> obstacles,
+std::string Explain(const Decision& decision, const Certifier& certifier, std::span<const Obstacle> obstacles,
                     const Plan& plan, const Tube& tube) {
-  return Sentence(decision, problem, obstacles) + ExplainUnbounded(decision, *problem.model, plan, tube) +
+  const Problem& problem = certifier.problem();
+  if (certifier.violation() && IsOfAffineRow(decision, problem)) {
+    std::string observations;
+    for (const int id : certifier.Contradicting())
+      observations += (observations.empty() ? "observations " : ", ") + std::to_string(id);
+    return ExplainAffine(decision, problem, observations);
+  }
+  return Sentence(decision, problem, obstacles) + ExplainUnbounded(decision, certifier, plan, tube) +
          (decision.capped ? kCapped : "");
 }
 

@@ -12,6 +12,7 @@
 
 namespace forereach {
 
+class Certifier;
 struct Plan;
 class Tube;
 
@@ -20,10 +21,12 @@ and are rounded so that the sentence stays true: a clearance down, a depth up.
 @param obstacles those of the call, for their names (NameOf). */
 [[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem,
                                   std::span<const Obstacle> obstacles = {});
-/** The same, where the plan and its tube are at hand. If the next state has no finite enclosure, it also names the
-operation of the model's text that meets its kink or pole (dynamics/unbounded.h). Not for the certify step. */
-[[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem, std::span<const Obstacle> obstacles,
-                                  const Plan& plan, const Tube& tube);
+/** The same, where who decided, the plan and its tube are at hand. If the next state has no finite enclosure, it also
+says in which direction the observations of an affine row do not vary, or names the operation of the model's text that
+meets its kink or pole (dynamics/unbounded.h); of an affine row that is contradicted it names all observations that show
+it. Not for the certify step. */
+[[nodiscard]] std::string Explain(const Decision& decision, const Certifier& certifier,
+                                  std::span<const Obstacle> obstacles, const Plan& plan, const Tube& tube);
 
 /** Contains r_k(z) for every admissible residual and every z over slice t: what step t took for it, with what a slope
 adds over the slice. @pre t < tube.length(). */

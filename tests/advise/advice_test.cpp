@@ -83,7 +83,7 @@ Decision Fresh(const Case& judged, std::string* sentence = nullptr) {
   Tube tube;
   certifier.Require(judged.plan(), judged.initial_set, judged.obstacles);
   const Decision decision = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
-  if (sentence) *sentence = Explain(decision, *judged.problem, judged.obstacles, judged.plan(), tube);
+  if (sentence) *sentence = Explain(decision, certifier, judged.obstacles, judged.plan(), tube);
   return decision;
 }
 

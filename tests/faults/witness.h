@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "bus/bus.h"
+#include "bus/bus_options.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
@@ -20,7 +21,6 @@
 #include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
-#include "bus/bus_options.h"
 
 namespace forereach {
 

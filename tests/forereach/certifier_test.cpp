@@ -258,7 +258,7 @@ TEST(AbstainDomain, AKinkOfATextIsNamedWithItsPlaceAndItsArgument) {
   EXPECT_EQ(d.cause, Cause::kNoFiniteEnclosure);
   EXPECT_EQ(d.step, 1) << "v is positive at first";
   EXPECT_THAT(
-      Explain(d, *shared, {}, plan, tube),
+      Explain(d, certifier, {}, plan, tube),
       testing::MatchesRegex("abstain D: at step 1 the next v has no finite enclosure: abs at line 1, column 10 of "
                             "the model has a kink or a pole there; its argument, a function of v, may be "
                             "anywhere in .-0[.][0-9]*, 0[.][0-9]*."));
@@ -266,7 +266,7 @@ TEST(AbstainDomain, AKinkOfATextIsNamedWithItsPlaceAndItsArgument) {
 
   const Decision good =
       certifier.Certify({controls.data(), 1, 1, 1, {}}, Zonotope::FromBox(Vec({0, 0, 5}), Vec({0, 0, 1})), {}, tube);
-  EXPECT_EQ(Explain(good, *shared, {}, plan, tube), Explain(good, *shared));
+  EXPECT_EQ(Explain(good, certifier, {}, plan, tube), Explain(good, *shared));
 }
 
 // A brake that ends at +-0.25 m/s, with the widths and the last bit of the residual around it.
