@@ -1,7 +1,7 @@
-#include <charconv>
-#include <chrono>
+#include <cstdint>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -11,6 +11,7 @@
 #include "fleet/transitions.h"
 #include "lcmtypes/printable.h"
 #include "task/config.h"
+#include "task/date.h"
 #include "task/json_text.h"
 
 namespace forereach {
@@ -24,18 +25,10 @@ struct FleetImportArguments {
 
 // The times of a day, UTC.
 void SetDay(const std::string& text, Store::WhichTransitions& which) {
-  int year = 0, month = 0, day = 0;
-  const char* const end = text.data() + text.size();
-  const bool is_date = text.size() == 10 && text[4] == '-' && text[7] == '-' &&
-                       std::from_chars(text.data(), end - 6, year).ptr == end - 6 &&
-                       std::from_chars(end - 5, end - 3, month).ptr == end - 3 &&
-                       std::from_chars(end - 2, end, day).ptr == end;
-  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
-                                         std::chrono::day(static_cast<unsigned>(day))};
-  if (!is_date || !date.ok()) throw ConfigError("--day: {} is no day, for example 2026-01-31", Printable(text));
-  using std::chrono::microseconds;
-  which.from = std::chrono::duration_cast<microseconds>(std::chrono::sys_days(date).time_since_epoch()).count();
-  which.until = which.from + microseconds(std::chrono::days(1)).count();
+  const auto begin = text.size() == 10 ? SecondsOfDate(text + "T00:00:00") : std::nullopt;
+  if (!begin) throw ConfigError("--day: {} is no day, for example 2026-01-31", Printable(text));
+  which.from = static_cast<std::int64_t>(*begin) * 1'000'000;
+  which.until = which.from + std::int64_t{86'400'000'000};
 }
 
 FleetTransitions Read(const FleetImportArguments& options, const Config& task) try {
