@@ -39,6 +39,7 @@ stopped goes on where it was; NAME.csv, tables.csv and report.md are made of the
   forereach-research drift                  a published car of nine states: research/higher-order-car.md
   forereach-research drift --drive          the same car driven to goals, certified
   forereach-research regional               a bound for each region of the domain: research/regions.md
+  forereach-research tightness              tubes over what no sound method can fall below
   FOREREACH=forereach-research scripts/fleet --hosts one,two run/job all --quick
                                                cells of experiments on several machines: --shard and merge
 
