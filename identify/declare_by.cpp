@@ -82,14 +82,22 @@ Config LoadForSlopes(const std::string& path) {
 std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model) {
   const std::vector<std::string>& states = model.state_names();
   const std::vector<std::string> variables = model.variable_names();
-  const std::string rows = Joined(states, [&](const std::string& state) {
-    const std::string row = Joined(variables, [&](const std::string& variable) {
-      const double slope = declaration.lipschitz(&state - states.data(), &variable - variables.data());
-      return slope > 0 ? fmt::format("{}: {}", variable, ToText(slope)) : "";
+  const auto by_names = [&](const Eigen::MatrixXd& slopes) {
+    return Joined(states, [&](const std::string& state) {
+      const std::string row = Joined(variables, [&](const std::string& variable) {
+        const double slope = slopes(&state - states.data(), &variable - variables.data());
+        return slope > 0 ? fmt::format("{}: {}", variable, ToText(slope)) : "";
+      });
+      return row.empty() ? "" : fmt::format("{}: {{{}}}", state, row);
     });
-    return row.empty() ? "" : fmt::format("{}: {{{}}}", state, row);
-  });
-  std::string text = fmt::format("  lipschitz: {{{}}}\n  noise_bound: {}\n", rows, List(declaration.noise_bound));
+  };
+  std::string text = fmt::format("  lipschitz: {{{}}}\n  noise_bound: {}\n", by_names(declaration.lipschitz),
+                                 List(declaration.noise_bound));
+  if (const auto& [rows, columns, rest] = declaration.affine; !rows.empty())
+    text += fmt::format("  affine: {{rows: [{}], columns: [{}]{}}}\n",
+                        Joined(rows, [&](int k) { return states[ToSize(k)]; }),
+                        Joined(columns, [&](int l) { return variables[ToSize(l)]; }),
+                        rest.isZero(0) ? "" : fmt::format(", rest: {{{}}}", by_names(rest)));
   if (declaration.growing) {
     text += "  disturbance:\n";
     for (Eigen::Index k = 0; k < std::ssize(states); ++k)

@@ -20,8 +20,8 @@ namespace forereach {
 are declared affine, or regions, beside which no slopes are proposed; or if an angle was wrapped (wrapped_angle.h). */
 [[nodiscard]] Config LoadForSlopes(const std::string& path);
 
-/** "lipschitz: {...}", "noise_bound: [...]" and perhaps "disturbance: [...]", or by names, and the disturbances of
-regions, a line each, indented by two. */
+/** "lipschitz: {...}", "noise_bound: [...]" and perhaps "affine: {...}", "disturbance: [...]", or by names, and the
+disturbances of regions, a line each, indented by two. */
 [[nodiscard]] std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model);
 
 }  // namespace forereach

@@ -15,6 +15,7 @@
 #include "forereach/numerics/text.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/observations.h"
+#include "identify/affine_proposal.h"
 #include "identify/calm_regions.h"
 #include "identify/declare_by.h"
 #include "identify/noise_floor.h"
@@ -270,6 +271,69 @@ void Warn(const HeldOutSteps& found) {
     std::cerr << "forereach: warning: " << warning << std::endl;
 }
 
+// ---- affine rows
+
+std::string LinesOf(const Config& config, const Refutation& found) {
+  return Joined(found.by, [&](int i) { return std::to_string(LineOf(config, i)); });
+}
+
+void PrintAffine(const AffineProposal& affine, const Config& config, const DataCommand& command, std::ostream& out) {
+  const std::vector<std::string>& states = config.problem->model->state_names();
+  const auto line = [](const auto&... cells) { return fmt::format("  {:<12}{:<44}{}\n", cells...); };
+  const auto when = [&](const std::optional<Refutation>& found) {
+    return !found ? "not refuted" : fmt::format("refuted by {}: lines {}", found->after, LinesOf(config, *found));
+  };
+  for (const JudgedRow& row : affine.rows)
+    out << (&row == affine.rows.data() ? "\n" + line("row", "as affine", "as slopes, by the first half") : "")
+        << line(states[ToSize(row.row)],
+                when(row.affine) + (row.affine ? fmt::format("; rest {}", RoundedUp(row.rest, 2)) : ""),
+                when(row.lipschitz));
+  if (!affine.rows.empty())
+    out << "\nas affine: after so many transitions, in their order, no M z + b agrees with them within noise_bound and "
+           "disturbance;\n  the lines alone show it. rest: the slopes of what a plane leaves, over those of the row.\n"
+           "as slopes, by the first half: after so many, a pair contradicts "
+        << ToText(command.factor) << " times the smallest slopes of the first half.\n";
+  if (!affine.unbounded.empty()) out << "No affine rows are proposed: " << affine.unbounded << ".\n";
+}
+
+// The declaration with affine rows, if there are any, and what the held-out steps say of both.
+void PrintAffineText(const AffineProposal& affine, const HeldOutSteps& slopes, const HeldOutSteps& held_out,
+                     const NominalModel& model, std::ostream& out) {
+  if (affine.declaration.affine.rows.empty()) return;
+  out << "\nOr with affine rows, which no transition refutes.";
+  if (held_out.slices() > 0)
+    out << " As above: " << TextOf(held_out) << ".\nA position is then known to " << RoundedUp(held_out.half_width, 3)
+        << " after " << held_out.steps << " steps, in the median; with slopes to " << RoundedUp(slopes.half_width, 3)
+        << ".";
+  out << "\n\ndeclaration:\n" << DeclarationYaml(affine.declaration, model) << std::flush;
+}
+
+Json ToJson(const AffineProposal& affine, const HeldOutSteps& slopes, const HeldOutSteps& held_out,
+            const Config& config) {
+  const NominalModel& model = *config.problem->model;
+  Json document{
+      {"columns", Json::array()}, {"rows", Json::array()}, {"yaml", nullptr}, {"unbounded", affine.unbounded}};
+  for (const int l : affine.columns) document["columns"].push_back(model.variable_names()[ToSize(l)]);
+  const auto when = [&](const std::optional<Refutation>& found) {
+    Json json;
+    if (!found) return json;
+    json = {{"after", found->after}, {"lines", Json::array()}};
+    for (const int i : found->by) json["lines"].push_back(LineOf(config, i));
+    return json;
+  };
+  for (const JudgedRow& row : affine.rows)
+    document["rows"].push_back({{"state", model.state_names()[ToSize(row.row)]},
+                                {"affine_refuted", when(row.affine)},
+                                {"slopes_refuted", when(row.lipschitz)},
+                                {"rest", row.rest}});
+  if (affine.declaration.affine.rows.empty()) return document;
+  document["yaml"] = "declaration:\n" + DeclarationYaml(affine.declaration, model);
+  document["held_out"] = ToJson(held_out);
+  document["half_width"] = held_out.half_width;
+  document["half_width_by_slopes"] = slopes.half_width;
+  return document;
+}
+
 // ---- for programs
 
 Json TradesJson(const ProposedRow& row) {
@@ -354,9 +418,14 @@ int DeclareFromData(const DataCommand& command) {
     for (int k = 0; k < problem.model->num_states(); ++k)
       lone_slopes.push_back(FindLoneSlopes(proposal.declaration, observations, k, options.columns[ToSize(k)]));
     const HeldOutSteps held_out = JudgeByHeldOut(config, proposal.declaration, command.jobs);
+    const AffineProposal affine = ProposeAffine(problem, observations, proposal, options);
+    const HeldOutSteps by_affine = affine.declaration.affine.rows.empty()
+                                       ? HeldOutSteps{}
+                                       : JudgeByHeldOut(config, affine.declaration, command.jobs);
     if (command.json) {
       Json document = ToJson(proposal, lone_slopes, config, command);
       document["held_out"] = ToJson(held_out);
+      document["affine"] = ToJson(affine, held_out, by_affine, config);
       std::cout << JsonText(document) << std::endl;
     } else {
       std::ostream& out = std::cout;
@@ -367,8 +436,10 @@ int DeclareFromData(const DataCommand& command) {
       PrintTrades(proposal, *problem.model, command.factor, out);
       PrintMeaning(proposal, *problem.model, command, out);
       PrintRegions(regions, command, out);
+      PrintAffine(affine, config, command, out);
       if (held_out.slices() > 0) out << "With every other block of time as observations: " << TextOf(held_out) << ".\n";
       out << "\ndeclaration:\n" << DeclarationYaml(proposal.declaration, *problem.model) << std::flush;
+      PrintAffineText(affine, held_out, by_affine, *problem.model, out);
     }
     Warn(held_out);
     for (const std::string& file : pictures)

@@ -309,6 +309,7 @@ HeldOutSteps JudgeByHeldOut(const Config& config, const Declaration& declaration
   CertifyWindows(config, declaration, split, chosen, jobs, trial);
   found.stretches = trial.windows;
   found.inside = trial.found_in[0], found.consistent = trial.found_in[1], found.left = trial.left();
+  found.half_width = trial.half_width;
   return found;
 }
 

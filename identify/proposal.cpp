@@ -14,20 +14,9 @@ namespace {
 // The estimators compare each with each.
 constexpr int kMostForEstimators = 1000;
 
-// A double that is at least x and prints with few digits.
-double Rounded(double x) { return std::strtod(RoundedUp(x, ProposedDeclaration::kDigits).c_str(), nullptr); }
-
 Observations Thinned(const Observations& observations, int most) {
   const std::vector<int> rows = EvenRows(observations.size(), most);
   return {observations.z(rows, Eigen::all), observations.lower(rows, Eigen::all), observations.upper(rows, Eigen::all)};
-}
-
-// The columns' scales, -1 for those that are not free.
-Eigen::RowVectorXd FreeScales(const Eigen::RowVectorXd& scales, const std::vector<int>& columns) {
-  Eigen::RowVectorXd free = Eigen::RowVectorXd::Constant(scales.size(), -1);
-  for (const int l : columns)
-    if (scales[l] > 0) free[l] = scales[l];
-  return free;
 }
 
 // The declaration with this error of row k, as its noise: pairs know sigma_k + w^_k alone.
@@ -58,11 +47,20 @@ void ExamineError(Declaration& proposed, const Observations& observations, int k
   if (options.find_trades && row.knee > 0) row.trades = TradesOf(proposed, observations, k, scales, row);
   if (!options.estimate_disturbance || !(row.scatter > 0)) return;
   if (proposed.disturbance.size() == 0) proposed.disturbance = Eigen::VectorXd::Zero(observations.num_states());
-  proposed.disturbance[k] = Rounded(options.factor * (proposed.disturbance[k] + row.scatter));
+  proposed.disturbance[k] = RoundedToPrint(options.factor * (proposed.disturbance[k] + row.scatter));
   row.proposed = proposed.ObservationError(k);
 }
 
 }  // namespace
+
+double RoundedToPrint(double x) { return std::strtod(RoundedUp(x, ProposedDeclaration::kDigits).c_str(), nullptr); }
+
+Eigen::RowVectorXd FreeScales(const Eigen::RowVectorXd& scales, const std::vector<int>& columns) {
+  Eigen::RowVectorXd free = Eigen::RowVectorXd::Constant(scales.size(), -1);
+  for (const int l : columns)
+    if (scales[l] > 0) free[l] = scales[l];
+  return free;
+}
 
 Observations ObserveForProposal(const Problem& problem, const Transitions& transitions) {
   Declaration declaration = problem.declaration;
@@ -85,7 +83,7 @@ ProposedDeclaration Propose(const Declaration& declaration, const Observations& 
     if (const double shown = std::max(row.noise.repeated, 3 * row.noise.deviation);
         options.estimate_noise && shown > proposed.noise_bound[k]) {
       // As it will be printed: the slopes have to hold with the number that is copied.
-      proposed.noise_bound[k] = Rounded(shown);
+      proposed.noise_bound[k] = RoundedToPrint(shown);
       row.is_raised = true;
     }
     const Eigen::RowVectorXd free = FreeScales(scales, options.columns[ToSize(k)]);
@@ -98,7 +96,7 @@ ProposedDeclaration Propose(const Declaration& declaration, const Observations& 
   for (int k = 0; k < n; ++k) {
     smallest.lipschitz.row(k) = proposal.rows[ToSize(k)].smallest.slopes;
     for (Eigen::Index l = 0; l < scales.size(); ++l)
-      proposed.lipschitz(k, l) = Rounded(options.factor * smallest.lipschitz(k, l));
+      proposed.lipschitz(k, l) = RoundedToPrint(options.factor * smallest.lipschitz(k, l));
   }
   const Observations some = Thinned(observations, kMostForEstimators);
   const std::vector<double> strongin = EstimateSlopes(SlopeEstimator::kStrongin, smallest, some, 1),

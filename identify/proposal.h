@@ -64,6 +64,12 @@ struct Unexplained : std::runtime_error {
   ObservedPair pair;
 };
 
+/** A double that is at least x and prints with kDigits digits. */
+[[nodiscard]] double RoundedToPrint(double x);
+
+/** `scales` of the columns, -1 for those that are not given or never vary: for FindSmallestRow. */
+[[nodiscard]] Eigen::RowVectorXd FreeScales(const Eigen::RowVectorXd& scales, const std::vector<int>& columns);
+
 /** The observations for Propose: what the declared errors of the records make of the residual itself is left out, since
 that depends on the slopes, so the proposed ones may be larger than they have to be. */
 [[nodiscard]] Observations ObserveForProposal(const Problem& problem, const Transitions& transitions);

@@ -1,0 +1,46 @@
+/** Rows of the residual as affine (AffineRows) and as rows with slopes: which of the two the observations refute, and
+after how many. Nothing that is proposed is proven. */
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "identify/proposal.h"
+
+namespace forereach {
+
+/** So many observations, in their order, refute a declaration. */
+struct Refutation {
+  int after = 0;
+  std::vector<int> by;  ///< Few of them that refute it alone, ascending.
+};
+
+/** What the observations say of one row that needs slopes, with the proposed sigma and w^. */
+struct JudgedRow {
+  int row = 0;
+  std::optional<Refutation> affine;     ///< No M z + b agrees with them.
+  std::optional<Refutation> lipschitz;  ///< A pair contradicts the slopes that the first half proposes, in the second.
+  /** Where they refute that it is affine: the smallest slopes of what the plane that fits best leaves; and their sum
+  over that of the row's own, weighed as in SmallestRow. Otherwise zeros. */
+  Eigen::RowVectorXd left;
+  double rest = 0;
+};
+
+struct AffineProposal {
+  static constexpr double kMostRest = 0.5;  ///< JudgedRow::rest up to which an affine row is proposed, with that rest.
+
+  std::vector<int> columns;  ///< Those of all rows that vary.
+  std::vector<JudgedRow> rows;
+  /** The proposal with affine rows in place of slopes, and bounds on those slopes that errors of z need; the
+  observations do not contradict it. No affine rows: none are proposed. */
+  Declaration declaration;
+  std::string unbounded;  ///< Why none are: they would have no bound (Certifier::Unexcited), or too many columns.
+};
+
+/** @param problem the task's. @param observations, options of Propose, which made `proposal`. Cost: for each row some
+tens of AffineSet::Derive, and two linear programs like Propose's. */
+[[nodiscard]] AffineProposal ProposeAffine(const Problem& problem, const Observations& observations,
+                                           const ProposedDeclaration& proposal, const ProposalOptions& options);
+
+}  // namespace forereach
