@@ -135,7 +135,7 @@ class Report:
         ] + [
             at_most(f"2,000 cells {place}",
                     [ratio(self.cpu(f"map/{body}/{cells}_2000"), self.cpu(f"map/{body}/none"))
-                     for body in ("point", "rectangle", "rectangle_swept")], 1.5, "one search for the nearest and the near")
+                     for body in ("point", "rectangle", "rectangle_swept")], 1.5, "sketches of bodies")
             for place, cells in (("along a street over none: point, rectangle, it at all times", "street"),
                                  ("anywhere, the same", "map"))
         ] + [

@@ -257,19 +257,6 @@ class SafetyTest::Unit {
     return ClosestPart(meeting, separate);
   }
 
-  // The same of what stands, by a direction that is given; the least of all parts.
-  [[nodiscard]] double ClearanceAlong(const Eigen::Vector3d& d, const Obstacle& obstacle) noexcept {
-    if (d.isZero(0)) return -kInfinity;
-    double least = kInfinity;
-    for (const Placement::Part& part : placement().parts()) {
-      double support = -kInfinity;
-      for (int t = first_; t <= last_; ++t)
-        support = Larger(support, placement().SupportUpper(SampleAt(t), part, d, test_.instructions_));
-      least = std::min(least, SubDown(DistanceLower(obstacle, d, support), AddUp(obstacle.radius(), part.radius)));
-    }
-    return least;
-  }
-
   // The better of the bound by hulls and that of the best directions.
   // Above the clearance `enough` it need not be the best.
   [[nodiscard]] PartSeparation Best(const PartSeparation& by_hulls, const Obstacle& obstacle, const Encounter& meeting,
@@ -522,8 +509,8 @@ class SafetyTest::Judgement {
   void SeeNear(const ObstacleIndex& index) noexcept {
     if (has_boxes()) EncloseBodies();
     if (!has_boxes() || index.has_moving() || !index.everywhere().empty()) EncloseHulls();
-    BuildTree(first_, units_);
-    if (has_sides_) SeeNearest(index);
+    MeasureHulls();
+    if (!test_.placement_.has_expressions()) Dispatch<&Judgement::FindNearest>(test_.instructions_, *this, index);
     SeeNear(index, first_, units_);
     if (index.has_moving()) SeeMoving(index);
     if (!index.everywhere().empty()) SeeEverywhere(index);
@@ -620,8 +607,8 @@ class SafetyTest::Judgement {
     Hull after{};
     for (int t = units_ - 1 + span(); t >= first_; --t) {
       const std::size_t i = ToSize(t - first_);
-      placement.PoseOver(tube_.slice(t), tube_.half_width(t), poses_[i]);
-      const Hull body = placement.EncloseBody(poses_[i]);
+      placement.PoseOver(tube_.slice(t), tube_.half_width(t), poses_[i], test_.instructions_);
+      const Hull body = placement.EncloseBody(poses_[i], test_.instructions_);
       if (t < units_) bodies_[i] = span() == 0 ? body : AroundBoth(body, after);
       after = body;
     }
@@ -641,36 +628,23 @@ class SafetyTest::Judgement {
   // Without initializers: a list of many costs nothing until they are found.
   struct Near {
     int t, o;
-    double gap;                     // a lower bound on the distance, about; no NaN
-    std::array<double, 2> towards;  // a direction that shows it; zero: none
-    bool is_refined;                // by that direction
+    double gap;  // a lower bound on the distance, about; no NaN
+    bool is_refined;
   };
 
-  // What is nearest by the bounds of a search leaves few of the others.
-  void SeeNearest(const ObstacleIndex& index) noexcept {
-    const Near nearest = Dispatch<&Judgement::FindNearest>(test_.instructions_, *this, index);
-    if (nearest.o < 0) return;
-    if (nearest.gap > WithTolerance(index, 0) && ConsiderNear(index, nearest))
-      considered_ = {nearest.t, nearest.o};
-    else
-      farthest_ = DistanceUpper(nearest.t, obstacle(nearest.o));
-  }
-  // The pair of the least lower bound; that of no obstacle is infinite.
-  [[nodiscard]] static Near FindNearest(Judgement& judgement, const ObstacleIndex& index) noexcept {
-    Near nearest{-1, -1, kInfinity, {}, true};
-    judgement.ForEachNear(
-        index, judgement.first_, [&] { return std::min(nearest.gap, judgement.closest_.clearance); },
-        [&](int t, int o) {
-          if (const Near pair = judgement.Approach(t, o, nearest.gap); pair.gap < nearest.gap) nearest = pair;
-        });
-    return nearest;
+  // What BoxTree asks about a unit.
+  [[nodiscard]] FOREREACH_INLINE auto GapOf(int t) noexcept {
+    return [ this, t, outline = static_cast<const Outline*>(nullptr) ](const BoxTree::Four& boxes) mutable
+        __attribute__((always_inline)) {
+      if (outline == nullptr && has_sides_ && IsKnown(t)) outline = &SketchBody(t);
+      return outline == nullptr ? AllLanes(-1) : GapAcrossSides(*outline, boxes);
+    };
   }
 
   // All pairs that may touch or be the closest, those that may touch in the order of time. If there are too many, fewer
   // units at once.
   void SeeNear(const ObstacleIndex& index, int from, int to) noexcept {
     std::array<Near, 256> near;
-    if (to - from < units_ - first_) BuildTree(from, to);
     const std::size_t count =
         Dispatch<&Judgement::Gather>(test_.instructions_, *this, index, from, to, std::span<Near>(near));
     if (count > near.size()) {
@@ -679,6 +653,8 @@ class SafetyTest::Judgement {
       return touched_ == units_ ? SeeNear(index, middle, to) : void();
     }
     const auto found = std::span(near).first(count);
+    for (Near& pair : found)
+      if (!(pair.gap > WithTolerance(index, 0)) && !std::exchange(pair.is_refined, true)) Refine(pair, kInfinity);
     const auto others =
         std::partition(found.begin(), found.end(), [&](const Near& a) { return !(a.gap > WithTolerance(index, 0)); });
     std::sort(found.begin(), others,
@@ -693,9 +669,7 @@ class SafetyTest::Judgement {
       Near& nearest = *std::ranges::min_element(rest, {}, &Near::gap);
       if (nearest.gap > WithTolerance(index, farthest())) return;
       if (!std::exchange(nearest.is_refined, true)) {
-        unit_.Enter(nearest.t);
-        const auto& [x, y] = nearest.towards;
-        nearest.gap = std::max(nearest.gap, unit_.ClearanceAlong({x, y, 0}, obstacle(nearest.o)));
+        Refine(nearest, WithTolerance(index, farthest()));
         continue;
       }
       ConsiderOrSearch(index, nearest);
@@ -707,33 +681,61 @@ class SafetyTest::Judgement {
   [[nodiscard]] static std::size_t Gather(Judgement& judgement, const ObstacleIndex& index, int from, int to,
                                           std::span<Near> near) noexcept {
     std::size_t count = 0;
-    judgement.ForEachNear(
-        index, from, [&] { return count > near.size() ? -kInfinity : judgement.farthest(); },
-        [&](int t, int o) {
-          const double far = judgement.WithTolerance(index, judgement.farthest());
-          if (count > near.size() || judgement.considered_ == std::pair(t, o)) return;
-          const Near pair = judgement.Approach(t, o, far);
-          if (pair.gap > far) return;
-          if (pair.gap < std::max(judgement.nearest_gap_, judgement.farthest_ / 16)) {
-            judgement.nearest_gap_ = std::min(judgement.nearest_gap_, pair.gap);
-            judgement.farthest_ = std::min(judgement.farthest_, judgement.DistanceUpper(t, judgement.obstacle(o)));
-          }
-          if (count < near.size())
-            near[count++] = pair;
-          else if (to - from > 1)
-            ++count;
-          else
-            judgement.Judge(index, pair);
-        });
+    const double reach = judgement.has_boxes() ? 0 : judgement.test_.placement_.reach();
+    const auto gather = [&](int t) {
+      const bool has_poses = judgement.HasPoses(t);
+      judgement.ForEachNear(
+          index, t, [&] { return count > near.size() ? -kInfinity : judgement.farthest(); },
+          [&](int o, double least) {
+            if (count > near.size()) return;
+            Near pair{t, o, least - reach, !has_poses};
+            if (t == judgement.approached_.t && o == judgement.approached_.o)
+              pair = judgement.approached_;
+            else if (pair.gap < judgement.nearest_gap_)
+              judgement.Approach(pair);
+            if (count < near.size())
+              near[count++] = pair;
+            else if (to - from > 1)
+              ++count;
+            else
+              judgement.Judge(index, pair);
+          });
+    };
+    for (int t = from; t < to && count <= near.size(); ++t) gather(t);
     return count;
+  }
+  // Bounds the distance of the closest pair by this one's.
+  void Approach(Near& pair) noexcept {
+    nearest_gap_ = pair.gap;
+    if (!std::exchange(pair.is_refined, true))
+      Refine(pair, farthest());
+    else
+      farthest_ = std::min(farthest_, DistanceUpper(pair.t, obstacle(pair.o)));
+    approached_ = pair;
+  }
+  // A pair that is about as near as any, of each second unit: the next one is near it.
+  static void FindNearest(Judgement& judgement, const ObstacleIndex& index) noexcept {
+    double least = kInfinity;
+    Near nearest{-1, -1, 0, true};
+    for (int t = judgement.units_ - 1; t >= judgement.first_; t -= 2)
+      if (const BoxTree::Found found = index.FindNear(judgement.hull(t), judgement.GapOf(t)); found.square < least) {
+        least = found.square;
+        nearest = {t, found.box, 0, !judgement.HasPoses(t)};
+      }
+    if (nearest.o < 0) return;
+    nearest.gap = std::sqrt(least) - (judgement.has_boxes() ? 0 : judgement.test_.placement_.reach());
+    judgement.Approach(nearest);
   }
   [[gnu::noinline]] void Judge(const ObstacleIndex& index, const Near& pair) noexcept {
     SettleNear(index, pair);
     ConsiderOrSearch(index, pair);
   }
-  void BuildTree(int from, int to) noexcept {
-    tree_.Build(std::span(has_boxes() ? bodies_ : hulls_).subspan(ToSize(from - first_), ToSize(to - from)),
-                test_.placement_.dim());
+  // Of the search.
+  [[nodiscard]] const Hull& hull(int t) const noexcept { return (has_boxes() ? bodies_ : hulls_)[ToSize(t - first_)]; }
+  void MeasureHulls() noexcept {
+    for (int t = first_; t < units_; ++t)
+      if (const double size = BoxTree::SizeOf(hull(t), test_.placement_.dim()); !(size <= size_) && !std::isnan(size_))
+        size_ = size;
   }
 
   // What is further is not the closest. Where places of the body are not known before they are enclosed, not yet.
@@ -750,32 +752,16 @@ class SafetyTest::Judgement {
     constexpr double kSearchTolerance = 1e-5;
     constexpr double kRounding = 0x1p-40;
     return std::max(distance, 0.0) * (1 + kSearchTolerance) +
-           kSearchTolerance * (index.size() + test_.placement_.reach()) + kRounding * tree_.size();
+           kSearchTolerance * (index.size() + test_.placement_.reach()) + kRounding * size_;
   }
 
-  // Calls visit(t, o) for units of the tree, which begins with unit `from`. Unless all of the body is at the frame,
-  // what is left out is further by more than a search may lose.
+  // Calls visit(o, least) for a unit. Unless all of the body is at the frame, what is left out is further by more than
+  // a search may lose.
   template <class Within, class Visit>
-  void ForEachNear(const ObstacleIndex& index, int from, const Within& within, const Visit& visit) noexcept {
-    const double reach = has_boxes() ? 0 : test_.placement_.reach();
+  void ForEachNear(const ObstacleIndex& index, int t, const Within& within, const Visit& visit) noexcept {
     index.ForEachNear(
-        tree_, reach, [&] { return is_at_frame() ? within() : WithTolerance(index, within()); },
-        [&](int i, int o) { visit(from + i, o); },
-        [&](int i, const Lanes& lower, const Lanes& upper)
-            __attribute__((always_inline)) { return GapAcrossSides(from + i, lower, upper); });
-  }
-
-  // Between the box around the body, or around its places widened by its reach, and that around the obstacle.
-  [[nodiscard]] double Gap(int t, const Obstacle& other) const noexcept {
-    const Hull& hull = (has_boxes() ? bodies_ : hulls_)[ToSize(t - first_)];
-    double square = 0;
-    for (int k = 0; k < test_.placement_.dim(); ++k) {
-      const double center = hull.center[ToSize(k)];
-      const double gap = std::max(other.lower()[k] - center, center - other.upper()[k]) - hull.half_width[ToSize(k)];
-      if (gap > 0) square += gap * gap;
-    }
-    const double gap = std::sqrt(square) - other.radius() - (has_boxes() ? 0 : test_.placement_.reach());
-    return gap > -kInfinity ? gap : -kInfinity;
+        hull(t), has_boxes() ? 0 : test_.placement_.reach(),
+        [&] { return is_at_frame() ? within() : WithTolerance(index, within()); }, visit, GapOf(t));
   }
 
   // The distance of some point of the body in the middle of a slice from some point of the obstacle, from above.
@@ -817,8 +803,12 @@ class SafetyTest::Judgement {
         }
       }
     }
+    return WithRounding(least - other.radius());
+  }
+  // From above.
+  [[nodiscard]] double WithRounding(double distance) const noexcept {
     constexpr double kRounding = 1e-12;
-    return least - other.radius() + kRounding * (tree_.size() + std::abs(least) + placement.reach());
+    return distance + kRounding * (size_ + std::abs(distance) + test_.placement_.reach());
   }
 
   // As Settle, of a pair that may touch. What is proven here may be the closest.
@@ -916,16 +906,16 @@ class SafetyTest::Judgement {
     const int t = pair.t, o = pair.o;
     const double far = WithTolerance(index, std::min(closest_.clearance, farthest_));
     if (pair.gap > far) return true;
-    const Separation by_hulls = ByHulls(t, o);
     unit_.Enter(t);
     if (is_at_frame()) {
+      const Separation by_hulls = ByHulls(t, o);
       if (!by_hulls.IsProven()) return false;
       if (closest_.Yields(by_hulls.clearance(), t, o) &&
           !(unit_.ByDirections(obstacle(o), {}).separation.clearance() > far))
         Consider({{by_hulls, -1}, {}, by_hulls.clearance(), t, o, true});
       return true;
     }
-    const auto direct = [&] { return unit_.ByDirections({by_hulls, -1}, obstacle(pair.o), {}); };
+    const auto direct = [&] { return unit_.ByDirections({ByHulls(pair.t, pair.o), -1}, obstacle(pair.o), {}); };
     if (test_.placement_.has_expressions() && direct().separation.clearance() > far) return true;
     const PartSeparation searched = unit_.BestOfParts(obstacle(o), {}, Enough());
     if (searched.separation.IsProven() && searched.separation.clearance() > Enough()) return true;
@@ -989,99 +979,103 @@ class SafetyTest::Judgement {
     return farthest + AllLanes(part.radius);
   }
 
-  // A lower bound, about, on the distance of the body from a box with these ends, by its sides; negative: none.
-  [[nodiscard]] FOREREACH_INLINE double GapAcrossSides(int t, const Lanes& lower, const Lanes& upper) noexcept {
-    if (!has_sides_ || !IsKnown(t)) return -1;
-    const Outline& outline = SketchBody(t);
-    const Lanes center = AllLanes(0.5) * (lower + upper), half_width = AllLanes(0.5) * (upper - lower);
-    const Lanes center_x = AllLanes(center[0]), center_y = AllLanes(center[1]), half_x = AllLanes(half_width[0]),
-                half_y = AllLanes(half_width[1]);
-    double least = kInfinity;
+  // Lower bounds, about, on the distances of the body from boxes, by its sides; negative: none.
+  [[nodiscard]] FOREREACH_INLINE Lanes GapAcrossSides(const Outline& outline,
+                                                      const BoxTree::Four& boxes) const noexcept {
+    const Lanes center_x = LoadLanes(boxes.center[0].data()), center_y = LoadLanes(boxes.center[1].data()),
+                half_x = LoadLanes(boxes.half_width[0].data()), half_y = LoadLanes(boxes.half_width[1].data());
+    Lanes least = AllLanes(kInfinity);
     for (const Placement::Part& part : test_.placement_.parts()) {
       Lanes best = AllLanes(-1);
-      for (std::size_t j = FirstSide(part.first), end = FirstSide(part.first + part.count); j < end; j += kLaneCount) {
-        const Lanes x = LoadLanes(&outline.x[j]), y = LoadLanes(&outline.y[j]);
-        const Lanes gap = x * center_x + y * center_y - Abs(x) * half_x - Abs(y) * half_y - LoadLanes(&outline.end[j]);
-        best = Max(FirstLanes(gap, end - j, -1), best);
+      for (std::size_t j = FirstSide(part.first), end = FirstSide(part.first + part.count); j < end; ++j) {
+        const Lanes x = AllLanes(outline.x[j]), y = AllLanes(outline.y[j]);
+        best = Max(x * center_x + y * center_y - Abs(x) * half_x - Abs(y) * half_y - AllLanes(outline.end[j]), best);
       }
-      least = std::min(least, std::max(std::max(best[0], best[1]), std::max(best[2], best[3])));
+      least = Min(best, least);
     }
     return least;
   }
 
-  // A bound by one direction.
-  struct Along {
-    double gap = -kInfinity;
-    std::array<double, 2> towards{};
-  };
-  // The largest lowest(x, y) - end of the sides of a part.
-  template <class Lowest>
-  [[nodiscard]] FOREREACH_INLINE Along AcrossSides(const Outline& outline, const Placement::Part& part,
-                                                   const Lowest& lowest) const noexcept {
-    Along best;
-    const std::size_t end = FirstSide(part.first + part.count);
-    for (std::size_t j = FirstSide(part.first); j < end; j += kLaneCount) {
-      const Lanes gaps = FirstLanes(
-          lowest(LoadLanes(&outline.x[j]), LoadLanes(&outline.y[j])) - LoadLanes(&outline.end[j]), end - j, -kInfinity);
-      const double most = std::max(std::max(gaps[0], gaps[1]), std::max(gaps[2], gaps[3]));
-      if (!(most > best.gap && most < kInfinity)) continue;
-      const std::size_t i = ToSize(std::countr_zero(BitsOf(gaps == AllLanes(most))));
-      best = {most, {outline.x[j + i], outline.y[j + i]}};
+  // Whether pairs of a unit can be refined.
+  [[nodiscard]] bool HasPoses(int t) const noexcept { return has_boxes() && test_.placement_.dim() == 2 && IsKnown(t); }
+  // Raises a pair's bound to about its distance, or above `far`, and lowers farthest_ to that from above. @pre
+  // HasPoses.
+  void Refine(Near& pair, double far) noexcept {
+    Dispatch<&Judgement::RefinePair>(test_.instructions_, *this, pair, far);
+  }
+  static void RefinePair(Judgement& judgement, Near& pair, double far) noexcept {
+    const Obstacle& other = judgement.obstacle(pair.o);
+    Bracket least{kInfinity, kInfinity};
+    for (const Placement::Part& part : judgement.test_.placement_.parts()) {
+      const double added = other.radius() + part.radius;
+      const Bracket found = judgement.DistanceOf(pair.t, part, other, far + added);
+      least = {std::min(least.lower, found.lower - added), std::min(least.upper, found.upper - added)};
     }
-    return best;
+    pair.gap = std::max(pair.gap, least.lower);
+    judgement.farthest_ = std::min(judgement.farthest_, judgement.WithRounding(least.upper));
   }
 
-  // A pair, with a lower bound on its distance, up to rounding: by the boxes around both; in the plane by the body's
-  // outline, unless it is above `far`.
-  [[nodiscard]] Near Approach(int t, int o, double far) noexcept {
-    const Obstacle& other = obstacle(o);
-    Near pair{t, o, Gap(t, other), {}, true};
-    if (pair.gap > far || !has_boxes() || test_.placement_.dim() != 2 || !IsKnown(t)) return pair;
-    const Outline& outline = SketchBody(t);
-    Along least;
-    least.gap = kInfinity;
-    for (const Placement::Part& part : test_.placement_.parts())
-      if (const Along along = GapAround(outline, other, part, far + other.radius()); along.gap < least.gap)
-        least = along;
-    pair.gap = std::max(pair.gap, least.gap - other.radius());
-    pair.towards = least.towards;
-    pair.is_refined = false;
-    return pair;
-  }
-  // Across the sides of the body, and from the nearest point to the box around the core.
-  [[nodiscard]] Along GapAround(const Outline& outline, const Obstacle& other, const Placement::Part& part,
-                                double far) const noexcept {
-    const auto lowest = [&](const Lanes& x, const Lanes& y) __attribute__((always_inline)) {
-      Lanes least = AllLanes(kInfinity);
-      for (const Eigen::Vector3d& point : other.hull())
-        least = Min(x * AllLanes(point[0]) + y * AllLanes(point[1]), least);
-      return least;
+  // Bounds on a distance, up to rounding.
+  struct Bracket {
+    double lower = -kInfinity, upper = kInfinity;
+  };
+  // Of the places of a part from a core, by a search as Separate's, which is given up where they are further than
+  // `far`.
+  [[nodiscard]] Bracket DistanceOf(int t, const Placement::Part& part, const Obstacle& core,
+                                   double far) const noexcept {
+    using Vector = Eigen::Vector2d;
+    constexpr int kSteps = 8;
+    constexpr double kEnough = 1e-4;
+    const auto nearest_on = [](const Vector& a, const Vector& b) -> Vector {
+      const Vector edge = b - a;
+      const double square = edge.squaredNorm();
+      return square > 0 ? Vector(a + edge * std::clamp(-a.dot(edge) / square, 0.0, 1.0)) : a;
     };
-    Along best;
-    if (part.count > 1) best = AcrossSides(outline, part, lowest);
-    if (best.gap > far) return best;
-    const Eigen::Vector3d &lower = other.lower(), &upper = other.upper();
-    double nearest = kInfinity, towards_x = 0, towards_y = 0;
+    Vector nearest = Offset(t, part, core), kept[2] = {nearest, nearest};
+    Bracket found;
+    for (int step = 0; step < kSteps; ++step) {
+      const double length = nearest.norm();
+      if (!(length > 0x1p-300) || length > found.upper - kEnough) break;
+      found.upper = length;
+      const Vector d = nearest / length;
+      Placement::Farthest farthest;
+      for (int s = 0; s <= span(); ++s)
+        test_.placement_.FindFarthest(poses_[ToSize(t - first_ + s)], tube_.slice(t + s), part, {d[0], d[1]}, farthest,
+                                      test_.instructions_);
+      if (!(farthest.support > -kInfinity)) break;  // no number: nothing is known
+      Vector lowest = core.hull().front().head<2>();
+      for (const Eigen::Vector3d& point : core.hull())
+        if (d.dot(point.head<2>()) < d.dot(lowest)) lowest = point.head<2>();
+      found.lower = std::max(found.lower, d.dot(lowest) - farthest.support);
+      if (found.lower > far) break;
+      lowest -= Vector(farthest.x, farthest.y);
+      const Vector first = nearest_on(lowest, kept[0]), second = nearest_on(lowest, kept[1]);
+      const bool with_first = first.squaredNorm() < second.squaredNorm();
+      nearest = with_first ? first : second;
+      kept[with_first ? 1 : 0] = lowest;
+    }
+    return found;
+  }
+  // From the middle of a part's point to a point of the core, about the nearest ones.
+  [[nodiscard]] Eigen::Vector2d Offset(int t, const Placement::Part& part, const Obstacle& core) const noexcept {
+    const bool is_box = core.kind() == Obstacle::Kind::kBox;
+    const Eigen::Vector3d &some = core.hull().front(), &lower = is_box ? core.lower() : some,
+                          &upper = is_box ? core.upper() : some;
+    Eigen::Vector2d nearest;
+    double least = kInfinity;
     for (int s = 0; s <= span(); ++s) {
-      const Placement::Pose& pose = poses_[ToSize(outline.t - first_ + s)];
+      const Placement::Pose& pose = poses_[ToSize(t - first_ + s)];
       for (std::size_t i = ToSize(part.first); i < ToSize(part.first + part.count); ++i) {
         const double x = pose.middle[0][i], y = pose.middle[1][i];
-        const double to_x = std::max(lower[0] - x, 0.0) + std::min(upper[0] - x, 0.0),
-                     to_y = std::max(lower[1] - y, 0.0) + std::min(upper[1] - y, 0.0);
-        if (const double square = to_x * to_x + to_y * to_y; square < nearest) {
-          nearest = square;
-          towards_x = to_x;
-          towards_y = to_y;
+        const Eigen::Vector2d offset(std::max(lower[0] - x, 0.0) + std::min(upper[0] - x, 0.0),
+                                     std::max(lower[1] - y, 0.0) + std::min(upper[1] - y, 0.0));
+        if (const double square = offset.squaredNorm(); square < least || least == kInfinity) {
+          least = square;
+          nearest = offset;
         }
       }
     }
-    if (!(nearest > 0x1p-600)) return best;
-    const double scale = 1 / std::sqrt(nearest);
-    const Lanes to_x = AllLanes(scale * towards_x), to_y = AllLanes(scale * towards_y);
-    if (const double gap = (lowest(to_x, to_y) - FarthestOf(outline.t, part, to_x, to_y))[0];
-        gap > best.gap && gap < kInfinity)
-      best = {gap, {to_x[0], to_y[0]}};
-    return best;
+    return nearest;
   }
 
   void ConsiderIfCloser(const Separation& by_hulls, int t, int o) noexcept {
@@ -1122,14 +1116,12 @@ class SafetyTest::Judgement {
       for (Pair& pair : nearest_.InOrder(closest_.clearance, least)) ConsiderIfCloser(pair);
     else if (index == nullptr || index->has_moving() || !index->everywhere().empty())
       LookAgain();
-    if (index != nullptr && test_.placement_.has_expressions()) {
-      BuildTree(first_, units_);
+    for (int t = first_; index != nullptr && test_.placement_.has_expressions() && t < units_; ++t)
       ForEachNear(
-          *index, first_, [&] { return closest_.clearance; },
-          [&](int t, int o) {
-            static_cast<void>(ConsiderNear(*index, {t, o, 0, {}, true}));
+          *index, t, [&] { return closest_.clearance; },
+          [&](int o, double) {
+            static_cast<void>(ConsiderNear(*index, {t, o, 0, true}));
           });
-    }
   }
 
   // At those for which there was no room.
@@ -1184,11 +1176,12 @@ class SafetyTest::Judgement {
   const bool has_sides_ =
       has_boxes() && test_.placement_.dim() == 2 &&
       std::ranges::all_of(test_.placement_.parts(), [](const auto& part) { return part.count > 1; });
-  std::array<Outline, 16> outlines_;        // of the units that were last looked at, by their remainders
-  double farthest_ = kInfinity;             // of the closest pair, from above
-  double nearest_gap_ = kInfinity;          // the least of those that farthest_ was found from
-  std::pair<int, int> considered_{-1, -1};  // a unit and an obstacle
-  HullTree tree_;                           // of units
+  std::array<Outline, 16> outlines_;  // of the units that were last looked at, by their remainders
+  double farthest_ = kInfinity;       // of the closest pair, from above
+  double nearest_gap_ = kInfinity;    // the least of those that farthest_ was found from
+  Near approached_{-1, -1, 0, true};  // the last of those, refined if it can be
+  double size_ = 0;                   // of the hulls of the search: a bound on their coordinates
+  HullTree tree_;                     // of units, for what moves
 };
 
 Decision SafetyTest::Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube, int first,

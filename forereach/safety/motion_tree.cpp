@@ -18,6 +18,41 @@ double PlainSeconds(std::int64_t us) noexcept { return 1e-6 * static_cast<double
 
 }  // namespace
 
+void HullTree::Build(std::span<const Hull> hulls, int dim) noexcept {
+  num_nodes_ = 0;
+  size_ = 0;
+  for (const Hull& hull : hulls) {
+    double size = 0;
+    for (std::size_t k = 0; k < ToSize(dim); ++k) size += std::abs(hull.center[k]) + hull.half_width[k];
+    if (!(size <= size_) && !std::isnan(size_)) size_ = size;
+  }
+  Build(hulls, dim, 0, static_cast<int>(hulls.size()));
+}
+
+// What is compared with NaN may get lost, but size_ then is NaN, and no pair is left out.
+int HullTree::Build(std::span<const Hull> hulls, int dim, int first, int count) noexcept {
+  const int number = num_nodes_++;
+  Node& node = nodes_[ToSize(number)];
+  node.first = first;
+  node.count = count;
+  if (count == 1) {
+    const auto& [c, w] = hulls[ToSize(first)];
+    const Lanes center{c[0], dim > 1 ? c[1] : 0, dim > 2 ? c[2] : 0, 0},
+        half_width{w[0], dim > 1 ? w[1] : 0, dim > 2 ? w[2] : 0, 0};
+    StoreLanes(center - half_width, node.lower.data());
+    StoreLanes(center + half_width, node.upper.data());
+    return number;
+  }
+  // Slices follow each other, so halves of the list are near each other without a sort, which a certify step has no
+  // time for.
+  Build(hulls, dim, first, count / 2);
+  node.second = Build(hulls, dim, first + count / 2, count - count / 2);
+  const Node &a = nodes_[ToSize(number + 1)], &b = nodes_[ToSize(node.second)];
+  StoreLanes(Min(LoadLanes(a.lower.data()), LoadLanes(b.lower.data())), node.lower.data());
+  StoreLanes(Max(LoadLanes(a.upper.data()), LoadLanes(b.upper.data())), node.upper.data());
+  return number;
+}
+
 // In plain arithmetic: SizeIn allows for its rounding.
 MotionTree::Node MotionTree::Around(std::span<const Obstacle* const> obstacles, std::span<const std::int32_t> some,
                                     std::int64_t reference_us) noexcept {

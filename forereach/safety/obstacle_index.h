@@ -24,16 +24,22 @@ class ObstacleIndex final {
   [[nodiscard]] std::span<const int> everywhere() const { return everywhere_; }
   /** An upper bound on the absolute values of the coordinates of those that stand, and on their radii. */
   [[nodiscard]] double size() const { return size_; }
-  /** BoxTree::ForEachNear of those that stand: visit(t, o). One that is left out is proven apart by SeparateHulls, with
-  `reach` added, and its clearance there exceeds `within()`; or by its `gap`, if that is given. */
+  /** BoxTree::ForEachNear of those that stand: visit(o, least). One that is left out is proven apart by SeparateHulls,
+  with `reach` added, and its clearance there exceeds `within()`; or by its `gap`, if that is given. */
   template <class Within, class Visit, class... Gap>
-  void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit,
-                   const Gap&... gap) const {
-    for (std::size_t g = 0; g <= grids_.size(); ++g) {
-      const Grid* const grid = g < grids_.size() ? &grids_[g] : nullptr;
-      const auto see = [&](int t, int i) { visit(t, grid != nullptr ? grid->first + i : standing_[ToSize(i)]); };
-      (grid != nullptr ? tree_of(*grid->grid) : tree_).ForEachNear(hulls, reach, within, see, gap...);
-    }
+  void ForEachNear(const Hull& hull, double reach, const Within& within, const Visit& visit, const Gap&... gap) const {
+    for (std::size_t g = 0; g <= grids_.size(); ++g)
+      Tree(g).ForEachNear(
+          hull, reach, within, [&](int i, double least) { visit(Number(g, i), least); }, gap...);
+  }
+  /** BoxTree::FindNear of those that stand: its box is the obstacle. */
+  template <class Gap>
+  [[nodiscard]] FOREREACH_INLINE BoxTree::Found FindNear(const Hull& hull, const Gap& gap) const noexcept {
+    BoxTree::Found nearest;
+    for (std::size_t g = 0; g <= grids_.size(); ++g)
+      if (const BoxTree::Found found = Tree(g).FindNear(hull, gap); found.square < nearest.square)
+        nearest = {Number(g, found.box), found.square};
+    return nearest;
   }
 
   [[nodiscard]] bool has_moving() const { return !moving_.empty(); }
@@ -51,6 +57,13 @@ class ObstacleIndex final {
   };
   // Of its blocks, whose first ones have all a size.
   [[nodiscard]] static const BoxTree& tree_of(const OccupancyGrid& grid);
+  // Those of the grids, and then that of the others.
+  [[nodiscard]] const BoxTree& Tree(std::size_t g) const {
+    return g < grids_.size() ? tree_of(*grids_[g].grid) : tree_;
+  }
+  [[nodiscard]] int Number(std::size_t g, int i) const {
+    return g < grids_.size() ? grids_[g].first + i : standing_[ToSize(i)];
+  }
 
   ConvexNumbers numbers_;
   std::vector<int> everywhere_, standing_, moving_;

@@ -46,10 +46,8 @@ class OccupancyGrid final {
     double least = kInfinity;
     const auto consider = [&](int block) { least = std::min(least, distance(blocks_[ToSize(block)])); };
     for (const int block : index_.everywhere()) consider(block);
-    HullTree tree;
-    tree.Build({&hull, 1}, 2);
     index_.ForEachNear(
-        tree, 0, [&] { return least; }, [&](int, int block) { consider(block); });
+        hull, 0, [&] { return least; }, [&](int block, double) { consider(block); });
     return least;
   }
 

@@ -158,6 +158,13 @@ Placement::Placement(const Eigen::MatrixXd& projection, const Body& body, const 
     FindSides(parts_.back());
   }
   Require(reach_ < kInfinity, "body: its size is not finite");
+  for (std::size_t i = 0; i < PaddedToLanes(points_.size()); ++i) {
+    const Point& point = points_[std::min(i, points_.size() - 1)];
+    outline_.x[i] = point.place[0], outline_.y[i] = point.place[1], outline_.z[i] = point.place[2];
+    outline_.length[i] = point.length, outline_.turn[i] = point.turn, outline_.size[i] = point.size;
+  }
+  for (const Part& part : parts_)
+    for (std::size_t i = ToSize(part.first); i < PaddedToLanes(points_.size()); ++i) outline_.radius[i] = part.radius;
   Require(!has_frame_ || !projection_.entries().empty(), "projection: is zero");
 }
 
@@ -188,48 +195,63 @@ void Placement::EncloseHull(const Sample& sample, Hull& hull) const noexcept {
   }
 }
 
+void Placement::PoseOver(const Zonotope& slice, std::span<const double> half_width, Pose& pose,
+                         InstructionSet instructions) const noexcept {
+  Dispatch<&Placement::PoseInline>(instructions, *this, slice, half_width, pose);
+}
+Hull Placement::EncloseBody(const Pose& pose, InstructionSet instructions) const noexcept {
+  return Dispatch<&Placement::BodyInline>(instructions, *this, pose);
+}
+
 // |R(theta) q - R(c) q| <= |q| r, and what OverSlice adds to it is of the second order: in each coordinate at most
 // (|q| + |q| r + |q| r^2 / 2) r^2 / 2.
-void Placement::PoseOver(const Zonotope& slice, std::span<const double> half_width, Pose& pose) const noexcept {
+void Placement::PoseInline(const Zonotope& slice, std::span<const double> half_width, Pose& pose) const noexcept {
   EncloseHull(slice, half_width, pose.frame);
   const Rotation rotation(heading_, slice, half_width);
   pose.cosine = rotation.cosine;
   pose.sine = rotation.sine;
+  pose.turn = rotation.half_width;
   const double r = rotation.half_width, half_square = 0.5 * r * r, turn = r + 1.5 * half_square * (1 + r + half_square);
   double size = turn + reach_;
   const auto& c = pose.frame.center;
   for (std::size_t k = 0; k < ToSize(dim()); ++k) size += std::abs(c[k]) + pose.frame.half_width[k];
   pose.is_known = size < 0x1p400;  // NaN is not
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Point& point = points_[i];
-    const Eigen::Vector3d& q = point.place;
-    pose.middle[0][i] = c[0] + (pose.cosine * q[0] - pose.sine * q[1]);
-    pose.middle[1][i] = c[1] + (pose.sine * q[0] + pose.cosine * q[1]);
-    pose.middle[2][i] = c[2] + q[2];
-    pose.around[i] = point.length * turn + point.turn;
+  const auto load = [](const auto& from, std::size_t i) __attribute__((always_inline)) { return LoadLanes(&from[i]); };
+  const Lanes cosine = AllLanes(pose.cosine), sine = AllLanes(pose.sine);
+  for (std::size_t i = 0; i < points_.size(); i += kLaneCount) {
+    const Lanes x = load(outline_.x, i), y = load(outline_.y, i);
+    StoreLanes(AllLanes(c[0]) + (cosine * x - sine * y), &pose.middle[0][i]);
+    StoreLanes(AllLanes(c[1]) + (sine * x + cosine * y), &pose.middle[1][i]);
+    if (dim() == 3) StoreLanes(AllLanes(c[2]) + load(outline_.z, i), &pose.middle[2][i]);
+    StoreLanes(load(outline_.length, i) * AllLanes(turn) + load(outline_.turn, i), &pose.around[i]);
   }
 }
 
-Hull Placement::EncloseBody(const Pose& pose) const noexcept {
-  Hull hull{};
-  std::array<double, kMaxSafetyDim> lower, upper;
-  lower.fill(kInfinity);
-  upper.fill(-kInfinity);
-  double size = 0;
-  for (const Part& part : parts_)
-    for (std::size_t i = ToSize(part.first); i < ToSize(part.first + part.count); ++i) {
-      const double around = pose.around[i] + part.radius;
-      for (std::size_t k = 0; k < ToSize(dim()); ++k) {
-        lower[k] = std::min(lower[k], pose.middle[k][i] - around);
-        upper[k] = std::max(upper[k], pose.middle[k][i] + around);
-      }
-      size = std::max(size, points_[i].size + around);
+Hull Placement::BodyInline(const Pose& pose) const noexcept {
+  std::array<Lanes, kMaxSafetyDim> lower, upper;
+  lower.fill(AllLanes(kInfinity));
+  upper.fill(AllLanes(-kInfinity));
+  Lanes sizes = AllLanes(0);
+  for (std::size_t i = 0; i < points_.size(); i += kLaneCount) {
+    const Lanes around = LoadLanes(&pose.around[i]) + LoadLanes(&outline_.radius[i]);
+    for (std::size_t k = 0; k < ToSize(dim()); ++k) {
+      const Lanes middle = LoadLanes(&pose.middle[k][i]);
+      lower[k] = Min(middle - around, lower[k]);
+      upper[k] = Max(middle + around, upper[k]);
     }
+    sizes = Max(LoadLanes(&outline_.size[i]) + around, sizes);
+  }
+  const auto largest = [](const Lanes& x) __attribute__((always_inline)) {
+    return std::max(std::max(x[0], x[1]), std::max(x[2], x[3]));
+  };
+  const double size = largest(sizes);
+  Hull hull{};
   for (std::size_t k = 0; k < ToSize(dim()); ++k) {
     const auto& [center, half_width] = pose.frame;
     const double slack = RoundingError(kPlaceMargin, std::abs(center[k]) + half_width[k] + size) + kLeastNormal;
-    hull.center[k] = pose.is_known ? 0.5 * (lower[k] + upper[k]) : 0;
-    hull.half_width[k] = pose.is_known ? 0.5 * (upper[k] - lower[k]) + half_width[k] + slack : kInfinity;
+    const double least = -largest(-lower[k]), most = largest(upper[k]);
+    hull.center[k] = pose.is_known ? 0.5 * (least + most) : 0;
+    hull.half_width[k] = pose.is_known ? 0.5 * (most - least) + half_width[k] + slack : kInfinity;
   }
   return hull;
 }
@@ -439,6 +461,69 @@ double Placement::SupportInline(const Sample& sample, const Part& part, const Ei
     if (std::isnan(support)) break;
   }
   return largest;
+}
+
+// As SupportInline, but for what is of the second order, which is bounded as in PoseOver and not part of the point. Of
+// most points the box and the ball show that others are farther.
+void Placement::FarthestInline(const Pose& pose, const Zonotope& slice, const Part& part,
+                               const std::array<double, 2>& d, Farthest& farthest) const noexcept {
+  const auto [dx, dy] = d;
+  const double box = std::abs(dx) * pose.frame.half_width[0] + std::abs(dy) * pose.frame.half_width[1];
+  const std::size_t first = ToSize(part.first), end = ToSize(part.first + part.count);
+  std::array<double, kMaxBodyPoints> most{};
+  std::size_t i = first;
+  for (std::size_t other = first; other < end; ++other) {
+    most[other] = dx * pose.middle[0][other] + dy * pose.middle[1][other] + pose.around[other] + box;
+    if (most[other] > most[i]) i = other;
+  }
+  if (!(most[i] > farthest.support)) return;
+  const std::size_t columns = slice.padded_size();
+  alignas(32) std::array<std::array<double, kMaxGenerators>, 2> sums;  // where a row of P does not copy a coordinate
+  std::array<const double*, 2> frame;
+  std::array<double, 2> slack;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const auto& row = rows_[k];
+    slack[k] = bulge_[k];
+    for (const MatrixEntry& entry : row) slack[k] += std::abs(entry.value.lower) * slice.slack(entry.column);
+    const bool copies = row.size() == 1 && row[0].value.lower == 1;
+    frame[k] = copies ? slice.padded_row(row[0].column).data() : sums[k].data();
+    for (std::size_t j = 0; !copies && j < columns; j += kLaneCount) {
+      Lanes sum = AllLanes(0);
+      for (const MatrixEntry& entry : row)
+        sum += AllLanes(entry.value.lower) * LoadLanes(slice.padded_row(entry.column).data() + j);
+      StoreLanes(sum, &sums[k][j]);
+    }
+  }
+  const double* const heading = slice.padded_row(std::max(heading_, 0)).data();
+  const double of_heading = heading_ < 0 ? 0 : slice.slack(heading_);
+  const LaneMask sign{INT64_MIN, INT64_MIN, INT64_MIN, INT64_MIN};
+  do {
+    // R'(c) q
+    const double slope_x = heading_ < 0 ? 0 : pose.frame.center[1] - pose.middle[1][i],
+                 slope_y = heading_ < 0 ? 0 : pose.middle[0][i] - pose.frame.center[0];
+    Lanes sum_x = AllLanes(0), sum_y = AllLanes(0);
+    for (std::size_t j = 0; j < columns; j += kLaneCount) {
+      const Lanes turned = LoadLanes(heading + j), x = LoadLanes(frame[0] + j) + AllLanes(slope_x) * turned,
+                  y = LoadLanes(frame[1] + j) + AllLanes(slope_y) * turned;
+      const LaneMask is_away = Bits(AllLanes(dx) * x + AllLanes(dy) * y) & sign;
+      sum_x += FromBits(Bits(x) ^ is_away);
+      sum_y += FromBits(Bits(y) ^ is_away);
+    }
+    const double x = pose.middle[0][i] + Sum(sum_x), y = pose.middle[1][i] + Sum(sum_y), turn = points_[i].turn;
+    const double support = dx * x + dy * y + std::abs(dx) * slack[0] + std::abs(dy) * slack[1] +
+                           std::abs(dx * slope_x + dy * slope_y) * of_heading + pose.around[i] -
+                           points_[i].length * pose.turn;
+    if (support > farthest.support)
+      farthest = {support, x + turn * dx + std::copysign(slack[0], dx), y + turn * dy + std::copysign(slack[1], dy)};
+    most[i] = -kInfinity;
+    for (std::size_t other = first; other < end; ++other)
+      if (most[other] > most[i]) i = other;
+  } while (most[i] > farthest.support);
+}
+
+void Placement::FindFarthest(const Pose& pose, const Zonotope& slice, const Part& part, const std::array<double, 2>& d,
+                             Farthest& farthest, InstructionSet instructions) const noexcept {
+  Dispatch<&Placement::FarthestInline>(instructions, *this, pose, slice, part, d, farthest);
 }
 
 void Placement::EncloseInline(const Sample& sample, Zonotope* places) const noexcept {

@@ -64,15 +64,26 @@ class Placement final {
   w] + {|y| <= around[i]}, with w the frame's half-widths, up to rounding. */
   struct Pose {
     Hull frame;
-    double cosine, sine;
-    bool is_known;  ///< Otherwise the points may be anywhere.
+    double cosine, sine, turn;  // the last: the heading's half-width
+    bool is_known;              ///< Otherwise the points may be anywhere.
     std::array<std::array<double, kMaxBodyPoints>, kMaxSafetyDim> middle;
     std::array<double, kMaxBodyPoints> around;
   };
   /** Cost O(nonzeros of P), O(1) for each point, a sine and a cosine. @pre no point stands at expressions. */
-  void PoseOver(const Zonotope& slice, std::span<const double> half_width, Pose& pose) const noexcept;
+  void PoseOver(const Zonotope& slice, std::span<const double> half_width, Pose& pose,
+                InstructionSet instructions = BestInstructionSet()) const noexcept;
   /** A hull that contains all of the body there. Cost O(points). */
-  [[nodiscard]] Hull EncloseBody(const Pose& pose) const noexcept;
+  [[nodiscard]] Hull EncloseBody(const Pose& pose, InstructionSet instructions = BestInstructionSet()) const noexcept;
+  struct Farthest {
+    double support = -kInfinity;
+    double x = 0, y = 0;  ///< the point
+  };
+  /** Raises `farthest.support` to an upper bound, up to rounding, on max {d . y} for the places of a part's points, as
+  Enclose gives them, and sets its point to one of them that is about as far; or leaves both if the bound is larger: p =
+  2, d of length 1. It is tighter than by the middles and what is around them. Cost O(m) for m generators and each point
+  that may be the farthest. @pre the pose is that of the slice, and known. */
+  void FindFarthest(const Pose& pose, const Zonotope& slice, const Part& part, const std::array<double, 2>& d,
+                    Farthest& farthest, InstructionSet instructions = BestInstructionSet()) const noexcept;
   /** The outward normal, of length 1, of the side from point i to the next of its part, p = 2, at the pose; zero if it
   has no length. */
   [[nodiscard]] std::array<double, 2> Side(const Pose& pose, int i) const noexcept {
@@ -138,11 +149,21 @@ class Placement final {
 
   struct Rotation;
 
+  // As a structure of arrays, of the points in the frame; the last one again up to a full vector.
+  struct Outline {
+    std::array<double, kMaxBodyPoints> x, y, z, length, turn, radius, size;
+  };
+
   void OverSlice(const Point& point, const Rotation& rotation, Sample::Point& over) const noexcept;
   void OverSlice(Sample& sample, std::size_t i) const noexcept;
   void FindSides(const Part& part) noexcept;
   FOREREACH_INLINE double SupportInline(const Sample& sample, const Part& part,
                                         const Eigen::Vector3d& d) const noexcept;
+  FOREREACH_INLINE void PoseInline(const Zonotope& slice, std::span<const double> half_width,
+                                   Pose& pose) const noexcept;
+  FOREREACH_INLINE Hull BodyInline(const Pose& pose) const noexcept;
+  FOREREACH_INLINE void FarthestInline(const Pose& pose, const Zonotope& slice, const Part& part,
+                                       const std::array<double, 2>& d, Farthest& farthest) const noexcept;
   FOREREACH_INLINE void EncloseInline(const Sample& sample, Zonotope* places) const noexcept;
   // Of a point that stands at expressions.
   FOREREACH_INLINE double SupportAtExpressions(const Sample& sample, int i, const Eigen::Vector3d& d) const noexcept;
@@ -157,6 +178,7 @@ class Placement final {
   std::array<double, kMaxSafetyDim> bulge_{};  // e
   std::vector<Part> parts_;
   std::vector<Point> points_;
+  Outline outline_{};
   std::optional<TextEnclosure> expressions_;
   int num_inputs_ = 0;      // that expressions could name
   bool has_frame_ = false;  // some point is in the frame

@@ -57,24 +57,37 @@ TEST(BoxTree, LeavesOutOnlyWhatIsFurtherThanAsked) {
     std::vector<Hull> sets = hulls;
     for (Hull& set : sets)
       for (std::size_t k = 0; has_sets && k < ToSize(dim); ++k) set.half_width[k] /= 2;
-    const auto gap = [&](int t, const Lanes& lower, const Lanes& upper) {
-      if (!has_sets) return -1.0;
-      double square = 0;
-      for (std::size_t k = 0; k < ToSize(dim); ++k) {
-        const auto& [center, half_width] = sets[ToSize(t)];
-        const double apart = std::max(lower[k] - center[k], center[k] - upper[k]) - half_width[k];
-        if (apart > 0) square += apart * apart;
-      }
-      return std::sqrt(square);
-    };
     std::map<std::pair<int, int>, int> visits;
-    BoxTree(boxes, dim)
-        .ForEachNear(
-            TreeOf(hulls, dim), reach, [&] { return within; },
-            [&](int t, int i) {
-              ++visits[{t, i}];
-            },
-            gap);
+    const BoxTree tree(boxes, dim);
+    for (int t = 0; t < std::ssize(hulls); ++t) {
+      const auto gap = [&](const BoxTree::Four& some) __attribute__((always_inline)) {
+        Lanes gaps = AllLanes(-1);
+        for (std::size_t lane = 0; has_sets && lane < kLaneCount; ++lane) {
+          double square = 0;
+          for (std::size_t k = 0; k < ToSize(dim); ++k) {
+            const auto& [center, half_width] = sets[ToSize(t)];
+            const double apart = std::abs(some.center[k][lane] - center[k]) - some.half_width[k][lane] - half_width[k];
+            if (apart > 0) square += apart * apart;
+          }
+          gaps[lane] = std::sqrt(square);
+        }
+        return gaps;
+      };
+      double nearest = kInfinity;
+      tree.ForEachNear(
+          hulls[ToSize(t)], reach, [&] { return within; },
+          [&](int i, double least) {
+            ++visits[{t, i}];
+            nearest = std::min(nearest, least);
+            const Rational square = SquareOfGap(boxes[ToSize(i)], sets[ToSize(t)], dim);
+            EXPECT_LE(Rational(least) * Rational(least), square + Rational(std::ldexp(scale, -40)) * Rational(scale))
+                << "hull " << t << ", box " << i;
+          },
+          gap);
+      const BoxTree::Found found = tree.FindNear(hulls[ToSize(t)], gap);
+      EXPECT_TRUE(0 <= found.box && found.box < count) << found.box;
+      EXPECT_GE(std::sqrt(found.square) * (1 + 1e-9), nearest == kInfinity ? 0 : std::min(nearest, within));
+    }
     const Rational most = Rational(reach) + Rational(std::max(within, 0.0));
     for (int t = 0; t < std::ssize(hulls); ++t)
       for (int i = 0; i < count; ++i) {
@@ -95,14 +108,13 @@ TEST(BoxTree, VisitsAllIfTheHullHasNoBounds) {
       const Hull before = std::exchange(hulls[which], Hull{{0, 0, 0}, {end, 0, 0}});
       int visits = 0;
       BoxTree(boxes, 2).ForEachNear(
-          TreeOf(hulls, 2), 0, [] { return 0.0; }, [&](int t, int) { visits += t == static_cast<int>(which) ? 1 : 0; });
+          hulls[which], 0, [] { return 0.0; }, [&](int, double) { ++visits; });
       EXPECT_EQ(visits, 20) << which;
       hulls[which] = before;
     }
   }
-  const std::vector<Hull> one(1);
   BoxTree().ForEachNear(
-      TreeOf(one, 2), 0, [] { return 0.0; }, [](int, int) { ADD_FAILURE(); });
+      Hull{}, 0, [] { return 0.0; }, [](int, double) { ADD_FAILURE(); });
 }
 
 TEST(BoxTree, LooksAtFewOfMany) {
@@ -110,9 +122,8 @@ TEST(BoxTree, LooksAtFewOfMany) {
   for (int i = 0; i < 100; ++i)
     for (int j = 0; j < 100; ++j) boxes.push_back({{1.0 * i, 1.0 * j, 0}, {i + 0.5, j + 0.5, 0}});
   int visits = 0;
-  const std::vector<Hull> hull{{{50, 50, 0}, {1, 1, 0}}};
   BoxTree(boxes, 2).ForEachNear(
-      TreeOf(hull, 2), 0.5, [] { return 1.0; }, [&](int, int) { ++visits; });
+      Hull{{50, 50, 0}, {1, 1, 0}}, 0.5, [] { return 1.0; }, [&](int, double) { ++visits; });
   EXPECT_GE(visits, 16);
   EXPECT_LE(visits, 80);
 }

@@ -415,6 +415,19 @@ TEST(Body, TheSupportOfAPartContainsItsPlaces) {
                                         std::abs(d[0]) * width[0] + std::abs(d[1]) * width[1]);
       EXPECT_GE(of_pose, of_places - 1e-11 * scale) << round;
       EXPECT_EQ(placement.SupportUpper(sample, part, d, InstructionSet::kBaseline), support);
+      const double length = d.norm();
+      Placement::Farthest farthest;
+      placement.FindFarthest(pose, slice, part, {d[0] / length, d[1] / length}, farthest);
+      EXPECT_GE(farthest.support, of_places / length - 1e-11) << round;
+      EXPECT_LE(farthest.support, of_pose / length + 1e-11) << round;
+      for (int trial = 0; trial < 8; ++trial) {  // the point is one of the places
+        const Vector3d e = trial == 0 ? Vector3d(d / length) : Vector3d(uniform(-1, 1), uniform(-1, 1), 0);
+        const double most = placement.SupportUpper(sample, part, e);
+        EXPECT_LE(e[0] * farthest.x + e[1] * farthest.y, most + 1e-11) << round;
+      }
+      const Placement::Farthest before = farthest;
+      placement.FindFarthest(pose, slice, part, {d[0] / length, d[1] / length}, farthest);  // no farther
+      EXPECT_FIELDS(farthest, (support, before.support), (x, before.x), (y, before.y));
       const BodyPart& points = body.parts[part.first == 0 ? 0 : 1];
       for (int trial = 0; trial < 20; ++trial) {
         const Eigen::VectorXd signs = Eigen::VectorXd::NullaryExpr(m, [&] { return uniform(0, 1) < 0.5 ? -1.0 : 1.0; });
