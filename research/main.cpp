@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "command_line/command_line.h"
+#include "research/affine_study.h"
 #include "research/chunks/training.h"
 #include "research/drift/drift.h"
 #include "research/drift/drive.h"
@@ -40,6 +41,7 @@ stopped goes on where it was; NAME.csv, tables.csv and report.md are made of the
   forereach-research drift --drive          the same car driven to goals, certified
   forereach-research regional               a bound for each region of the domain: research/regions.md
   forereach-research tightness              tubes over what no sound method can fall below
+  forereach-research affine                 affine rows of the residual: research/affine.md
   FOREREACH=forereach-research scripts/fleet --hosts one,two run/job all --quick
                                                cells of experiments on several machines: --shard and merge
 
@@ -127,6 +129,7 @@ int main(int argc, char** argv) {
                     "instead, drive it to goals: planner, certifier, guard and simulated robot; 20 seeds"}}});
   program.commands.push_back({.name = "regional", .purpose = "a bound on the residual for each region of the domain"});
   program.commands.push_back({.name = "tightness", .purpose = "tubes over the inner bound; recall in pieces of X_0"});
+  program.commands.push_back({.name = "affine", .purpose = "rows of the residual that are affine, up to a rest"});
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
 
   for (const Experiment& experiment : Experiments())
@@ -156,6 +159,8 @@ int main(int argc, char** argv) {
       RunRegional({options.directory, quick, command}, std::cout);
     } else if (name == "tightness") {
       return RunTightness(quick, std::cout), 0;
+    } else if (name == "affine") {
+      RunAffine({options.directory, quick, command}, std::cout);
     } else if (name == "drift") {
       if (drives)
         RunDriftDrives({options.directory, seeds.value_or(quick ? kQuickSeeds : 20), quick, command + " --drive"},

@@ -1,8 +1,6 @@
 #include "research/regional.h"
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -14,22 +12,15 @@
 #include "forereach/dynamics/models/residuals.h"
 #include "forereach/residual/lipschitz_envelope.h"
 #include "forereach/residual/regional_enclosure.h"
-#include "research/cell.h"
 #include "research/equations_slopes.h"
-#include "research/evaluate.h"
+#include "research/group_sums.h"
 #include "research/markdown.h"
 #include "research/run_directory.h"
 
 namespace forereach::research {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr SlopeBoundOptions kSlopes{.gap = 1e-2, .max_boxes = 20'000};
-
-double MicrosecondsSince(Clock::time_point begin) {
-  return std::chrono::duration<double, std::micro>(Clock::now() - begin).count();
-}
 
 // L and regions for all parameters of the road within a share of the paper's.
 struct DeclaredByRegion {
@@ -41,7 +32,7 @@ struct DeclaredByRegion {
 template <class Residual>
 DeclaredByRegion Declare(const System& system, const Residual& residual, std::size_t first_of_road, double share,
                          const std::vector<int>& variables, std::size_t most_cells) {
-  const auto begin = Clock::now();
+  const auto begin = std::chrono::steady_clock::now();
   const EquationsSlopes<Residual> slopes;
   const RegionSearchOptions search{.most_cells = most_cells, .slopes = kSlopes};
   std::vector<Interval> parameters;
@@ -55,18 +46,8 @@ DeclaredByRegion Declare(const System& system, const Residual& residual, std::si
       if (slopes.Occurs(k, l))
         declared.lipschitz(k, l) = BoundSlope(slopes, system.domain, parameters, k, l, kSlopes).upper;
   declared.regions = FindRegions(slopes, system.domain, parameters, declared.lipschitz, variables, search);
-  declared.seconds = MicrosecondsSince(begin) * 1e-6;
+  declared.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return declared;
-}
-
-// The point mass without the ball around its speeds: no region may be bounded by what a ball names.
-const System& PointMassInABox() {
-  static const System system = [] {
-    System in_a_box = PointMassSystem();
-    in_a_box.domain.balls.clear();
-    return in_a_box;
-  }();
-  return system;
 }
 
 class RegionalByCells final : public ResidualEnclosure {
@@ -95,65 +76,16 @@ Method WithRegions(const DeclaredByRegion& declared) {
           }};
 }
 
-// Of one method over the seeds.
-struct RegionalSum {
-  std::array<int, 3> safe{}, certified{}, complete{};  // by group
-  std::array<double, 3> side{};                        // half of that of a square as large as P X_T, m
-  int false_certificates = 0, outside = 0;
-  double build_us = 0, call_us = 0;
-
-  [[nodiscard]] std::string Recall(std::size_t g) const {
-    return safe[g] == 0 ? "none" : fmt::format("{:.3f}", static_cast<double>(certified[g]) / safe[g]);
-  }
-  [[nodiscard]] std::string HalfWidth(std::size_t g) const {
-    return complete[g] == 0 ? "none" : fmt::format("{:.3f}", side[g] / complete[g]);
-  }
-};
-
-void CountInto(const CellResult& result, RegionalSum& sum) {
-  for (std::size_t g = 0; g < result.size(); ++g) {
-    const Tally& tally = result[g];
-    sum.safe[g] += tally.safe;
-    sum.certified[g] += tally.certified_safe;
-    sum.false_certificates += tally.false_certificates();
-    sum.outside += tally.complete() - tally.covered;
-    for (const double area : tally.areas)
-      if (area >= 0) ++sum.complete[g], sum.side[g] += std::sqrt(area) / 2;
-  }
-}
-
-// The median time of a call, over the plans of C.
-double CallTime(const System& system, const ResidualEnclosure& residual, int seed, int plans) {
-  const Evaluator evaluator(system, residual, 5);
-  std::vector<double> times;
-  Answer answer;
-  for (int i = 0; i < plans; ++i) {
-    const Scenario scenario = MakeScenario(system, Group::kC, seed, i);
-    const auto begin = Clock::now();
-    evaluator.Certify(scenario, answer);
-    times.push_back(MicrosecondsSince(begin));
-  }
-  std::ranges::nth_element(times, times.begin() + std::ssize(times) / 2);
-  return times[times.size() / 2];
-}
-
-RegionalSum RunSeeds(const System& system, const Method& method, const DeclaredByRegion& declared, int observations,
-                     int seeds, const Effort& effort) {
-  RegionalSum sum;
-  for (int seed = 0; seed < seeds; ++seed) {
-    Cell cell{&system, method, {"certified", declared.lipschitz}, observations, 0, seed};
-    CountInto(RunCell(cell, effort), sum);
-    const Transitions data = MakeData(system, cell.layout, seed, observations, 0);
-    const Declaration declaration{declared.lipschitz, Eigen::VectorXd::Zero(system.num_states())};
-    const auto begin = Clock::now();
-    const auto residual = method.make({*system.model, system.domain, declaration, data, 0});
-    sum.build_us += MicrosecondsSince(begin) / seeds;
-    sum.call_us += CallTime(system, *residual, seed, effort.scenarios) / seeds;
-  }
-  return sum;
-}
-
 }  // namespace
+
+const System& PointMassInABox() {
+  static const System system = [] {
+    System in_a_box = PointMassSystem();
+    in_a_box.domain.balls.clear();
+    return in_a_box;
+  }();
+  return system;
+}
 
 void RunRegional(const RegionalStudyOptions& options, std::ostream& out) {
   const Effort effort = options.quick ? Effort{20, 24} : Effort{80, 70};
@@ -173,8 +105,10 @@ void RunRegional(const RegionalStudyOptions& options, std::ostream& out) {
       cells += fmt::format("{}{}, {} %: {} regions in {:.1f} s", cells.empty() ? "" : "; ", system->name, percent,
                            declared.regions.size(), declared.seconds);
       for (const int observations : sizes) {
-        const RegionalSum flat = RunSeeds(*system, Methods().front(), declared, observations, seeds, effort),
-                          regional = RunSeeds(*system, WithRegions(declared), declared, observations, seeds, effort);
+        const GroupSums flat =
+                            SumOfSeeds(*system, Methods().front(), declared.lipschitz, observations, 0, seeds, effort),
+                        regional = SumOfSeeds(*system, WithRegions(declared), declared.lipschitz, observations, 0,
+                                              seeds, effort);
         Cells row{system->name, std::to_string(percent), std::to_string(observations)};
         for (const std::size_t g : {2, 1, 0}) row.push_back(flat.Recall(g) + " → " + regional.Recall(g));
         for (const std::size_t g : {2, 1, 0}) row.push_back(flat.HalfWidth(g) + " → " + regional.HalfWidth(g));

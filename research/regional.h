@@ -6,7 +6,12 @@ paper's systems, plans and data. */
 #include <iosfwd>
 #include <string>
 
+#include "research/systems.h"
+
 namespace forereach::research {
+
+/** The point mass without the ball around its speeds: no region may be bounded by what a ball names. */
+[[nodiscard]] const System& PointMassInABox();
 
 struct RegionalStudyOptions {
   std::filesystem::path directory;  ///< Of results
