@@ -1,5 +1,4 @@
 #include "bench/straightforward.h"
-#include "forereach/certify/tube.h"
 
 #include <algorithm>
 #include <cmath>

@@ -19,8 +19,8 @@ function(forereach_compile_together)
 endfunction()
 
 # Files with compile options or definitions of their own, generated ones, and those that differ from the last commit stay
-# alone: who works on a file waits for it, and not for those beside it. A source with BEGINS_BATCH is the first of those that
-# include a header of which the ones before it know nothing, and need not be compiled anew after a change of it.
+# alone: who works on a file waits for it, and not for those beside it. A source with BEGINS_BATCH begins a batch: one before which
+# no file includes a header that changes often, or one that makes two batches even.
 execute_process(COMMAND git diff --name-only HEAD WORKING_DIRECTORY ${CMAKE_SOURCE_DIR} OUTPUT_VARIABLE changed ERROR_QUIET)
 string(REPLACE "\n" ";" forereach_changed "${changed}")
 function(forereach_batches target directory)
@@ -31,7 +31,7 @@ function(forereach_batches target directory)
   if(length LESS 2 OR folder MATCHES "^(tests/)?(research|bench)")  # the last two are built by few, and seldom
     return()
   endif()
-  # As many as a job's memory holds, in parts of one size: each part costs as much again as six files that share one.
+  # As many as a job's memory holds, in parts of one size where no BEGINS_BATCH cuts them: each part costs as much again as six files that share one.
   set(most 24)
   if(folder MATCHES "^tests")
     set(most 18)
@@ -43,6 +43,7 @@ function(forereach_batches target directory)
   set(count 0)
   set(batches "")
   foreach(source ${sources} "end")
+    # This function is called from the root, where a relative path would be another.
     cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${directory} OUTPUT_VARIABLE file)
     get_source_file_property(options ${file} TARGET_DIRECTORY ${target} COMPILE_OPTIONS)
     get_source_file_property(definitions ${file} TARGET_DIRECTORY ${target} COMPILE_DEFINITIONS)

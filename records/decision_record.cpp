@@ -11,7 +11,6 @@
 #include <nlohmann/json.hpp>
 
 #include "forereach/certify/explain.h"
-#include "forereach/certify/tube.h"
 #include "forereach/decision_t.hpp"
 #include "forereach/safety/placement.h"
 #include "lcmtypes/names.h"

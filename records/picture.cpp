@@ -13,7 +13,6 @@
 
 #include <librsvg/rsvg.h>
 
-#include "forereach/certify/tube.h"
 #include "records/outlines.h"
 #include "records/output_file.h"
 

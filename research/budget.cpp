@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "forereach/certify/tube.h"
 #include "research/experiment.h"
 #include "research/methods/cp_sls.h"
 

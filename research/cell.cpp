@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "forereach/certify/tube.h"
 #include "forereach/numerics/text.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/observations.h"

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "forereach/certify/tube.h"
 #include "research/evaluate.h"
 #include "research/experiment.h"
 #include "research/methods/envelope.h"

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <memory>
 
-#include "forereach/certify/tube.h"
 #include "forereach/sets/zonogon.h"
 
 namespace forereach::research {

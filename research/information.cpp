@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "forereach/certify/extremal.h"
-#include "forereach/certify/tube.h"
 #include "forereach/dynamics/models/residuals.h"
 #include "forereach/residual/observations.h"
 #include "forereach/sets/zonogon.h"

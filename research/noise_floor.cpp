@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "forereach/certify/tube.h"
 #include "forereach/sets/zonogon.h"
 #include "research/evaluate.h"
 #include "research/experiment.h"

@@ -1,11 +1,12 @@
 #include "forereach/certify/extender.h"
-#include "forereach/certify/tube.h"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
+
+#include "forereach/certify/tube.h"
 
 namespace forereach {
 

@@ -2,12 +2,12 @@
 // certifier of its own; every remedy of an answer without a judgement likewise, by a gate of its own.
 #include "advise/advice.h"
 
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "advise/gate_advice.h"
 #include "advise/hypotheses.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/numerics/size.h"
 #include "lcmtypes/names.h"
 #include "tests/advise/answered.h"

@@ -2,11 +2,11 @@
 // they claim to be.
 #include "bench/straightforward.h"
 
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "bench/latencies.h"
 #include "bench/tasks.h"
+#include "forereach/certify/tube.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/traced_random.h"
 

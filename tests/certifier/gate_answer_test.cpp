@@ -1,9 +1,9 @@
 // The gate's answer to an admitted candidate: outcomes, witnesses, digests, slices, counts.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/gate.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/text_model.h"
 #include "lcmtypes/seal.h"
 #include "task/step_time.h"

@@ -1,10 +1,10 @@
 // Random mutations of valid candidates, and the same bytes twice.
 #include <bit>
 
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "certifier/gate/gate.h"
+#include "forereach/certify/tube.h"
 #include "lcmtypes/seal.h"
 #include "tests/certifier/small_task.h"
 

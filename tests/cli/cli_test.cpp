@@ -2,7 +2,6 @@
 #include <cstdio>
 #include <regex>
 
-#include "forereach/certify/tube.h"
 #include "tests/cli/program.h"
 #include "tests/task/task_files.h"
 

@@ -1,9 +1,9 @@
 // Affine rows of the residual in the certifier: a wrong gain, what bounds it, and what contradicts it.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "tests/worlds.h"
 
 namespace forereach::affine_rows_test {

@@ -2,10 +2,10 @@
 // certifier refuses to be made of.
 #include "forereach/certify/certifier.h"
 
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/certify/way_clear.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/oracle/random.h"

@@ -3,9 +3,9 @@
 
 #include <map>
 
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
+#include "forereach/certify/tube.h"
 #include "forereach/safety/obstacle_index.h"
 #include "forereach/safety/occupancy_grid.h"
 #include "tests/oracle/any_task.h"

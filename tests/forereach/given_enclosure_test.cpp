@@ -1,9 +1,9 @@
 // A certifier over an enclosure of the residual that the caller supplies.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "tests/worlds.h"
 
 namespace forereach::given_enclosure_test {

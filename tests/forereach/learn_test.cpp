@@ -1,8 +1,8 @@
 // A certifier that learns transitions gives the same answers as one that had them from the start.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"

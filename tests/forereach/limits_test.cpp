@@ -1,11 +1,11 @@
 // Limits on functions of state and input: just inside and just outside, which samples count, what comes first.
 #include "forereach/certify/limits.h"
 
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"

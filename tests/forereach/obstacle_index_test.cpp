@@ -1,9 +1,9 @@
 // An index of obstacles leaves out nothing that is near, and changes no decision.
 #include "forereach/safety/obstacle_index.h"
-#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 
+#include "forereach/certify/tube.h"
 #include "tests/oracle/any_surroundings.h"
 #include "tests/oracle/traced_random.h"
 

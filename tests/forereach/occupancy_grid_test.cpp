@@ -1,9 +1,9 @@
 // A grid is the union of its occupied cells: to the last bit, and for each decision.
 #include "forereach/safety/occupancy_grid.h"
-#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 
+#include "forereach/certify/tube.h"
 #include "forereach/certify/way_clear.h"
 #include "forereach/safety/clearance.h"
 #include "tests/oracle/any_surroundings.h"

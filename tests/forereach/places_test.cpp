@@ -1,9 +1,9 @@
 // Parts of a body that stand at expressions of the state: an arm whose links just clear an obstacle, and just do not.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"

@@ -1,9 +1,9 @@
 // Declared bounds on rates that a transition contradicts: then nothing is certified.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/oracle/exact.h"
 #include "tests/text_models.h"

@@ -1,11 +1,11 @@
 // Regions in the certifier: what they narrow, what contradicts them, and what is refused.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include <cmath>
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/angles.h"
 #include "tests/worlds.h"
 

@@ -1,11 +1,11 @@
 // Which errors of steps a problem may declare, and what a step adds for them.
 #include "forereach/reach/step_offsets.h"
-#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"

@@ -1,8 +1,8 @@
 // Bodies, motion between samples, and obstacles that move: each at its boundary, just inside and just outside.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 #include "tests/worlds.h"
 
 namespace forereach::sweep_test {

@@ -1,9 +1,9 @@
 // A declared turn rate that the plan's own slices contradict: there is no motion that it describes.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/explain.h"
 #include "forereach/certify/standing.h"
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"

@@ -8,6 +8,7 @@ the exit is 1 above 256 MiB. */
 #include <limits>
 #include <random>
 #include <string>
+#include <string_view>
 
 #include <sys/resource.h>
 

@@ -1,10 +1,10 @@
 // Affine rows of the residual: bounds, hulls and contradictions against rationals, and rollouts of residuals that the
 // data admit, in 256 bits, against tubes.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include <numeric>
 
+#include "forereach/certify/tube.h"
 #include "forereach/residual/affine_rows_enclosure.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/affine_problems.h"

@@ -1,8 +1,8 @@
 // What a certificate claims, tried: rollouts of many residuals that satisfy data and declaration, in 256 bits, never
 // leave a slice of the tube, and under a certified plan never meet an obstacle.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
+#include "forereach/certify/tube.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/traced_random.h"
 

@@ -1,9 +1,9 @@
 // A step of an affine model against exact rationals: the successor's support is nowhere below that of the exact image,
 // whichever way the model is expanded.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 #include "forereach/reach/propagator.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/traced_random.h"

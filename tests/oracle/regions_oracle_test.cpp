@@ -1,8 +1,8 @@
 // Regions against rationals: residuals that use up what L and the regions allow, on the cheapest ways between many
 // points, stay within the bounds.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
+#include "forereach/certify/tube.h"
 #include "forereach/residual/regional_enclosure.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/region_problems.h"

@@ -1,8 +1,8 @@
 // The verifier's envelope against rational numbers, where recorded observations contradict each other by less than
 // doubles show.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
+#include "forereach/certify/tube.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/observations.h"
 #include "tests/oracle/exact.h"

@@ -1,8 +1,8 @@
 #include "planner_bridge/certified_plan.h"
-#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 
+#include "forereach/certify/tube.h"
 #include "planner_bridge/lessons.h"
 #include "planner_bridge/proposal.h"
 #include "tests/planner_bridge/tasks.h"

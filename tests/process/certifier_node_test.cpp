@@ -1,7 +1,7 @@
 // The certifier's node: candidates, their answers and what else it sends, by an in-memory bus and a simulated clock.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
+#include "forereach/certify/tube.h"
 #include "lcmtypes/candidate_batch.h"
 #include "tests/process/certifier_node_fixture.h"
 

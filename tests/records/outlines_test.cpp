@@ -1,9 +1,9 @@
 // What a picture shows of a body: a sweep contains the body at every sample that it spans, and predictions grow.
 #include "records/outlines.h"
-#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 
+#include "forereach/certify/tube.h"
 #include "tests/worlds.h"
 
 namespace forereach::outlines_test {

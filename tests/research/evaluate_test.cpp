@@ -1,6 +1,5 @@
 // One plan under one method: the certifier's own answers, and a coverage test that detects missing coverage.
 #include "research/evaluate.h"
-#include "forereach/certify/tube.h"
 
 #include "tests/test.h"
 

@@ -1,8 +1,8 @@
 // Certificates of random problems, of residuals with affine rows and with regions: what the certifier claims, the
 // verifier derives by its own ways.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
+#include "forereach/certify/tube.h"
 #include "tests/oracle/affine_problems.h"
 #include "tests/oracle/region_problems.h"
 #include "tests/oracle/traced_random.h"

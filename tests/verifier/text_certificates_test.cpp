@@ -1,7 +1,7 @@
 // Certificates of models that are texts: what the certifier claims, the verifier derives by its own parser.
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/text_models.h"

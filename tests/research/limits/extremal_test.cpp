@@ -1,10 +1,10 @@
 // The extremal residuals are admissible, and every tube of the certifier contains their rollouts.
 #include "forereach/certify/extremal.h"
 
-#include "forereach/certify/tube.h"
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/tube.h"
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research::extremal_test {
