@@ -632,14 +632,19 @@ class SafetyTest::Judgement {
     bool is_refined;
   };
 
-  // What BoxTree asks about a unit.
-  [[nodiscard]] FOREREACH_INLINE auto GapOf(int t) noexcept {
-    return [ this, t, outline = static_cast<const Outline*>(nullptr) ](const BoxTree::Four& boxes) mutable
-        __attribute__((always_inline)) {
-      if (outline == nullptr && has_sides_ && IsKnown(t)) outline = &SketchBody(t);
-      return outline == nullptr ? AllLanes(-1) : GapAcrossSides(*outline, boxes);
-    };
-  }
+  // What BoxTree asks about a unit. The outline is sketched when it is first needed.
+  struct Outline;
+  struct SideGaps {
+    Judgement* judgement;
+    int t;
+    const Outline* outline = nullptr;
+
+    FOREREACH_INLINE Lanes operator()(const BoxTree::Four& boxes) noexcept {
+      if (outline == nullptr && judgement->has_sides_ && judgement->IsKnown(t)) outline = &judgement->SketchBody(t);
+      return outline == nullptr ? AllLanes(-1) : judgement->GapAcrossSides(*outline, boxes);
+    }
+  };
+  [[nodiscard]] SideGaps GapOf(int t) noexcept { return {this, t}; }
 
   // All pairs that may touch or be the closest, those that may touch in the order of time. If there are too many, fewer
   // units at once.

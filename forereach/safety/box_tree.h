@@ -154,7 +154,7 @@ class BoxTree final {
   // The larger of two bounds, one of them as a square.
   [[nodiscard]] FOREREACH_INLINE static Lanes Closer(const Lanes& square, const Lanes& gap) noexcept {
     const Lanes its_square = gap * gap;
-    return (gap > AllLanes(0)) & (its_square > square) ? its_square : square;
+    return ((gap > AllLanes(0)) & (its_square > square)) ? its_square : square;
   }
   // What is not a number is no distance.
   [[nodiscard]] FOREREACH_INLINE Lanes SquareOfDistance(const Hull& hull, const Four& boxes) const noexcept {
