@@ -1,6 +1,7 @@
 #include "identify/affine_proposal.h"
 
 #include <algorithm>
+#include <memory>
 
 #include <fmt/format.h>
 #include <Eigen/QR>
@@ -69,7 +70,7 @@ class AffineJudge {
   [[nodiscard]] JudgedRow Judge(int k) const {
     JudgedRow judged{k, RefuteAffine(k), RefuteSlopes(k), Eigen::RowVectorXd::Zero(scales_.size())};
     if (judged.affine) judged.left = RestOf(k);
-    judged.rest = scales_.dot(judged.left) / scales_.dot(proposal_.rows[ToSize(k)].smallest.slopes);
+    judged.rest_share = scales_.dot(judged.left) / scales_.dot(proposal_.rows[ToSize(k)].smallest.slopes);
     return judged;
   }
 
@@ -147,8 +148,8 @@ AffineProposal ProposeAffine(const Problem& problem, const Observations& observa
   const AffineJudge judge(problem, observations, proposal, options);
   AffineProposal found{judge.columns(), {}, proposal.declaration, ""};
   if (found.columns.size() > AffineRows::kMaxColumns) {
-    found.unbounded = fmt::format("an affine row has at most {} columns, and here {} vary: name fewer (--by)",
-                                  AffineRows::kMaxColumns, found.columns.size());
+    found.why_none = fmt::format("an affine row has at most {} columns, and here {} vary: name fewer (--by)",
+                                 AffineRows::kMaxColumns, found.columns.size());
     return found;
   }
   Declaration& declaration = found.declaration;
@@ -158,18 +159,20 @@ AffineProposal ProposeAffine(const Problem& problem, const Observations& observa
   for (int k = 0; k < observations.num_states(); ++k) {
     if (proposal.declaration.lipschitz.row(k).isZero(0)) continue;
     found.rows.push_back(judge.Judge(k));
-    if (found.rows.back().rest <= AffineProposal::kMostRest) judge.Declare(found.rows.back(), declaration);
+    if (found.rows.back().rest_share <= AffineProposal::kMostRest) judge.Declare(found.rows.back(), declaration);
   }
-  bool is_sound = !declaration.affine.rows.empty();
-  if (is_sound) {
+  bool is_usable = !declaration.affine.rows.empty();
+  if (is_usable) {
     auto with = std::make_shared<Problem>(problem);
     with->declaration = declaration;
     const Certifier certifier(with);
-    found.unbounded = certifier.Unexcited();
+    found.why_none = certifier.Unexcited();
     // What was rounded on the way may contradict: who decides about plans has the last word.
-    is_sound = found.unbounded.empty() && !certifier.violation();
+    if (found.why_none.empty() && certifier.violation())
+      found.why_none = "the observations contradict them as they would be printed";
+    is_usable = found.why_none.empty();
   }
-  if (!is_sound) declaration = proposal.declaration;
+  if (!is_usable) declaration = proposal.declaration;
   return found;
 }
 

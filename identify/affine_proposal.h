@@ -21,21 +21,22 @@ struct JudgedRow {
   int row = 0;
   std::optional<Refutation> affine;     ///< No M z + b agrees with them.
   std::optional<Refutation> lipschitz;  ///< A pair contradicts the slopes that the first half proposes, in the second.
-  /** Where they refute that it is affine: the smallest slopes of what the plane that fits best leaves; and their sum
-  over that of the row's own, weighed as in SmallestRow. Otherwise zeros. */
+  /** If refuted as affine: the smallest slopes of what the best plane leaves. Otherwise zeros. */
   Eigen::RowVectorXd left;
-  double rest = 0;
+  double rest_share = 0;  ///< Their sum over that of the row's own slopes, weighed as in SmallestRow.
 };
 
 struct AffineProposal {
-  static constexpr double kMostRest = 0.5;  ///< JudgedRow::rest up to which an affine row is proposed, with that rest.
+  /** JudgedRow::rest_share up to which an affine row is proposed, with `left` times the factor as its rest. */
+  static constexpr double kMostRest = 0.5;
 
   std::vector<int> columns;  ///< Those of all rows that vary.
   std::vector<JudgedRow> rows;
   /** The proposal with affine rows in place of slopes, and bounds on those slopes that errors of z need; the
   observations do not contradict it. No affine rows: none are proposed. */
   Declaration declaration;
-  std::string unbounded;  ///< Why none are: they would have no bound (Certifier::Unexcited), or too many columns.
+  /** Why none are, though some rows would do: too many columns, no bound (Certifier::Unexcited), or a contradiction. */
+  std::string why_none;
 };
 
 /** @param problem the task's. @param observations, options of Propose, which made `proposal`. Cost: for each row some

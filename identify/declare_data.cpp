@@ -286,14 +286,14 @@ void PrintAffine(const AffineProposal& affine, const Config& config, const DataC
   for (const JudgedRow& row : affine.rows)
     out << (&row == affine.rows.data() ? "\n" + line("row", "as affine", "as slopes, by the first half") : "")
         << line(states[ToSize(row.row)],
-                when(row.affine) + (row.affine ? fmt::format("; rest {}", RoundedUp(row.rest, 2)) : ""),
+                when(row.affine) + (row.affine ? fmt::format("; rest {}", RoundedUp(row.rest_share, 2)) : ""),
                 when(row.lipschitz));
   if (!affine.rows.empty())
     out << "\nas affine: after so many transitions, in their order, no M z + b agrees with them within noise_bound and "
            "disturbance;\n  the lines alone show it. rest: the slopes of what a plane leaves, over those of the row.\n"
            "as slopes, by the first half: after so many, a pair contradicts "
         << ToText(command.factor) << " times the smallest slopes of the first half.\n";
-  if (!affine.unbounded.empty()) out << "No affine rows are proposed: " << affine.unbounded << ".\n";
+  if (!affine.why_none.empty()) out << "No affine rows are proposed: " << affine.why_none << ".\n";
 }
 
 // The declaration with affine rows, if there are any, and what the held-out steps say of both.
@@ -311,8 +311,7 @@ void PrintAffineText(const AffineProposal& affine, const HeldOutSteps& slopes, c
 Json ToJson(const AffineProposal& affine, const HeldOutSteps& slopes, const HeldOutSteps& held_out,
             const Config& config) {
   const NominalModel& model = *config.problem->model;
-  Json document{
-      {"columns", Json::array()}, {"rows", Json::array()}, {"yaml", nullptr}, {"unbounded", affine.unbounded}};
+  Json document{{"columns", Json::array()}, {"rows", Json::array()}, {"yaml", nullptr}, {"why_none", affine.why_none}};
   for (const int l : affine.columns) document["columns"].push_back(model.variable_names()[ToSize(l)]);
   const auto when = [&](const std::optional<Refutation>& found) {
     Json json;
@@ -325,7 +324,7 @@ Json ToJson(const AffineProposal& affine, const HeldOutSteps& slopes, const Held
     document["rows"].push_back({{"state", model.state_names()[ToSize(row.row)]},
                                 {"affine_refuted", when(row.affine)},
                                 {"slopes_refuted", when(row.lipschitz)},
-                                {"rest", row.rest}});
+                                {"rest", row.rest_share}});
   if (affine.declaration.affine.rows.empty()) return document;
   document["yaml"] = "declaration:\n" + DeclarationYaml(affine.declaration, model);
   document["held_out"] = ToJson(held_out);

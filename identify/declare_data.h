@@ -39,7 +39,9 @@ struct HeldOutSteps {
   /** Slices that recorded states can be compared with: those that contain all, a part or nothing of the states that
   the record allows (lcmtypes/angle.h, Conformance). */
   int inside = 0, consistent = 0, left = 0;
-  double half_width = 0;  ///< The median over the stretches of a position's, after their steps; infinite: no tube.
+  /** Of a position after `steps` steps, the median over the stretches; infinite if half of the tubes or more end
+  before. */
+  double half_width = 0;
 
   [[nodiscard]] int slices() const { return inside + consistent + left; }
 };

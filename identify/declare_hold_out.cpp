@@ -35,7 +35,8 @@ struct Trial {
   int windows = 0, certified = 0;
   int states = 0;                 // recorded ones of all windows
   std::array<int, 3> found_in{};  // of those that have a slice, by Conformance
-  double half_width = 0;          // median over the windows, of a position in the last slice; 0 if no tube is complete
+  // Of a position in the last slice, the median over the windows; infinite if half of the tubes or more are incomplete.
+  double half_width = 0;
 
   // A tube may end before its window.
   [[nodiscard]] int slices() const { return std::reduce(found_in.begin(), found_in.end()); }

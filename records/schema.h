@@ -43,7 +43,7 @@ Column<OrNull<Number>> NamedOrNull(const char* name, Number& number) {
 inline constexpr std::array kGroundColumns{"config_digest", "model_digest", "declaration_digest", "observations_digest",
                                            "obstacles_digest"};
 
-/** Columns named as the members of a row. */
+/** Columns named as the members of a row: ", Named(..)" for each member; the 0 before takes the first comma. */
 #define FOREREACH_COLUMN(member) , Named(#member, row.member)
 #define FOREREACH_COLUMN_OR_NULL(member) , NamedOrNull(#member, row.member)
 #define FOREREACH_COLUMNS(...) AsTuple(0 NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(FOREREACH_COLUMN, __VA_ARGS__)))
@@ -116,8 +116,8 @@ constexpr const char* TypeOf(OrNull<Number>) {
   return "BIGINT";
 }
 
-/** The statements that make them, of version Database::kSchemaVersion. Tables of another version are refused: logs make
-them anew (ingest, and the logger where its database is gone). */
+/** The statements that make the tables, of version Database::kSchemaVersion. Tables of another version are refused:
+logs make them anew (ingest, and the logger where its database is gone). */
 inline std::string TablesSql(const Dialect& dialect) {
   std::string sql = fmt::format(
       R"sql(CREATE TABLE {} (
@@ -135,5 +135,10 @@ inline std::string TablesSql(const Dialect& dialect) {
   });
   return sql;
 }
+
+#undef FOREREACH_COLUMNS_OR_NULL
+#undef FOREREACH_COLUMNS
+#undef FOREREACH_COLUMN_OR_NULL
+#undef FOREREACH_COLUMN
 
 }  // namespace forereach

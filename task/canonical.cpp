@@ -138,7 +138,7 @@ Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles) {
       for (const bool is_occupied : map.occupied) cells += is_occupied ? '#' : '.';
       bytes.Text(cells);
     }
-    // A word before each: what one obstacle has and the next lacks is not taken for each other.
+    // A word before each: obstacles with different fields never have the same bytes.
     if (!obstacle.name().empty()) {
       bytes.Text("named");
       bytes.Text(obstacle.name());

@@ -334,7 +334,6 @@ bool Meet(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c, const P
 
 std::vector<std::pair<double, double>> SharesOutside(const PlanePoint& a, const PlanePoint& b,
                                                      const std::vector<const Ring*>& rings) {
-  constexpr std::size_t kMostCuts = 100;
   std::vector<std::pair<mpq_class, mpq_class>> inside;
   for (const Ring* const ring : rings) {
     // Between two cuts the segment does not meet the ring, or it lies along a side: its middle tells for all of it.

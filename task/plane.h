@@ -1,6 +1,7 @@
 /** Points and polygons of the plane. What compares is exact on doubles; what is computed covers, rounded outward. */
 #pragma once
 
+#include <cstddef>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -63,9 +64,13 @@ corners than kMaxAreaCorners. */
 /** Whether two closed segments have a point in common. Exact. */
 [[nodiscard]] bool Meet(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c, const PlanePoint& d);
 
+/** Of SharesOutside: so many places where a ring cuts the segment count, with its two ends. */
+inline constexpr std::size_t kMostCuts = 100;
+
 /** The parts of the segment from a to b that lie strictly inside no ring (a point is inside if a ray from it meets the
 ring an odd number of times), but for single points, as shares of it from 0 to 1, ascending. Decided exactly; each part
-is rounded outward. A ring that meets the segment more than 100 times counts as if it were not there. @pre a != b. */
+is rounded outward. A ring that cuts the segment at more places than kMostCuts counts as if it were not there.
+@pre a != b. */
 [[nodiscard]] std::vector<std::pair<double, double>> SharesOutside(const PlanePoint& a, const PlanePoint& b,
                                                                    const std::vector<const Ring*>& rings);
 

@@ -213,7 +213,7 @@ Nodes::Nodes(const Ways& ways, int k) : ways_(ways), k_(k) {
   for (std::size_t cell = 0; cell < nodes; ++cell) {
     if (std::ranges::any_of(axes_, [&](const Axis& axis) { return TickOf(axis, cell) + 1 == axis.ticks.size(); }))
       continue;
-    // Each edge lies in all cells that have it.
+    // An edge lies in every cell around it: the least slope holds.
     const std::vector<std::size_t> corners = CornersOf(cell);
     for (Axis& axis : axes_) {
       const double slope = Slope(axis, cell);
@@ -230,7 +230,7 @@ std::vector<std::size_t> Nodes::CornersOf(std::size_t cell) const {
   return corners;
 }
 
-// Where the first axes up to this one run from a node: the least of the cells around.
+// On the face that spans the axes up to this one: the least of the cells around.
 double Nodes::SlopeOn(std::size_t a, std::size_t node) const {
   std::vector<std::size_t> cells{node};
   for (std::size_t b = a + 1; b < axes_.size(); ++b) {
@@ -358,7 +358,8 @@ std::pair<Real, Real> Nodes::Over(std::span<const Real> box, const Slopes& slope
 // By how much the middle of the bounds rises between two points, in parts of which the largest slope has 250.7.
 std::optional<Nodes::Slopes> Nodes::SlopesOver(std::span<const Real> center, std::span<const Real> half_width) const {
   Slopes slopes{};
-  for (std::size_t a = 0; a < axes_.size() && axes_.size() < 3; ++a) {
+  if (axes_.size() > 2) return slopes;  // m = 0 (3.20)
+  for (std::size_t a = 0; a < axes_.size(); ++a) {
     const std::vector<double>& ticks = axes_[a].ticks;
     const double range = ticks.back() - ticks.front(), part = axes_[a].largest_slope / kSlopes;
     if (!(part > 0) || !(range > 0) || !(axes_[a].largest_slope * range < 0x1p900)) continue;

@@ -394,8 +394,8 @@ class RoadReader {
     return lanelet;
   }
 
-  // The parts of the segment where no other lanelet has the road on both sides. An end that is none of the segment's is
-  // rounded, and the part grown by that.
+  // The parts of the segment where no other lanelet has the road on both sides. A computed end is rounded, and its part
+  // grown by that error.
   [[nodiscard]] std::vector<Ring> OffTheRoad(const Lanelet& own, const PlanePoint& a, const PlanePoint& b) const {
     std::vector<const Ring*> areas;
     for (const Lanelet& other : lanelets_)
@@ -517,8 +517,8 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
   for (const auto& [kind, count] : counts) text += fmt::format(", {} {}", count, kind);
   world.notes.insert(world.notes.begin(), text + ".");
   world.notes.push_back(fmt::format(
-      "The boundary: bounds of lanelets where no neighbour is within {} m; {} segments inside another lanelet are left "
-      "out as far as they are. Lanelets have open ends, and a change to a neighbour's lane in the other direction is "
+      "The boundary: bounds of lanelets where no neighbour is within {} m; {} segments are left out where they lie "
+      "inside another lanelet. Lanelets have open ends, and a change to a neighbour's lane in the other direction is "
       "allowed.",
       CommonRoadOptions::kBeside, road.inside()));
   if (obstacles.without_orientation() > 0)

@@ -25,9 +25,9 @@ using Json = nlohmann::json;
 
 constexpr std::int64_t kLargestDrawing = 64 * kMegabyte;
 constexpr double kFarthest = 1e9;  // m, of a coordinate
-// So near to the equator and the first meridian, where nobody drives, metres of Web Mercator are those of the ground to
+// So near to the equator and the prime meridian, where nobody drives, metres of Web Mercator are those of the ground to
 // 1.3 millionths: a map's own, whatever the file calls them.
-constexpr double kMercatorIsGround = 1e4;
+constexpr double kFarthestMercator = 1e4;
 
 // ---- From degrees to metres
 
@@ -127,7 +127,7 @@ class Drawing {
             "degrees of them, for --origin. If the file says so of a map's own metres, as editors of routes do, give "
             "--metres",
             path_, system.substr(0, 80));
-      farthest_ = kMercatorIsGround;
+      farthest_ = kFarthestMercator;
     }
     if (is("CRS84") || is(":4326")) return true;
     world_.notes.push_back(

@@ -260,7 +260,7 @@ World ReadOccupancyMap(const std::string& path, const MapOptions& options) try {
                                     ToText(map.resolution), occupied));
   if (occupied == std::ssize(map.occupied))
     world.notes.push_back(fmt::format(
-        "No cell is free: see free_thresh, {}, negate and mode, and whether the image is a map of what is occupied.",
+        "No cell is free: check free_thresh ({}), negate and mode, and whether the image is an occupancy map.",
         ToText(file.free)));
   if (options.coarsen > 1)
     world.notes.push_back(fmt::format("{0} by {0} cells are occupied if one of them is.", options.coarsen));

@@ -7,6 +7,8 @@
 #include "forereach/certify/batch.h"
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/pieces.h"
+#include "forereach/residual/region_grid.h"
+#include "forereach/residual/region_table.h"
 #include "forereach/safety/obstacle_index.h"
 #include "tests/gap.h"
 #include "tests/sanitized.h"
@@ -159,6 +161,9 @@ TEST_F(Allocation, CertifyAllocatesNothingForRegions) {
       problem.domain.inequalities.clear();  // no region may be bounded by what one names
       declaration.regions[0].box.insert(declaration.regions[0].box.begin(), {3, {-1, 30}});
     }
+    const RegionGrid grid(declaration);
+    ASSERT_FALSE(grid.rows().empty());
+    for (std::size_t row = 0; row < grid.rows().size(); ++row) EXPECT_EQ(RegionTable::Fits(grid, row), has_table);
     certifier_.emplace(std::make_shared<Problem>(problem));
     EXPECT_EQ(Count(10, 0, {}, Outcome::kCertified), 0);
   }

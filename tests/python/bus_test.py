@@ -201,7 +201,7 @@ class Ends(BusTest):
         self.assertTrue(robot.halted)
         self.assertEqual(robot.counts["steps_inside"], 4)
 
-    def test_of_a_robot_that_began_anew_take_a_plan_before_they_are_given_a_state(self):
+    def test_of_a_robot_that_restarted_take_a_plan_before_they_are_given_a_state(self):
         self.start_certifier()
         task = fr.Task.load(TASK)
         before, anew = (fr.Supervisor(task, key=Path(self.keys), url=URL) for _ in range(2))

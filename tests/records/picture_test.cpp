@@ -38,9 +38,10 @@ TEST(Picture, ALongTitleIsWrittenSmaller) {
   DrawPicture(picture, scratch / "short.svg");
   picture.title = std::string(120, 'm');
   DrawPicture(picture, scratch / "long.svg");
-  const std::vector<std::uint8_t> small = ReadBytes(scratch / "short.svg"), large = ReadBytes(scratch / "long.svg");
-  EXPECT_THAT(std::string(small.begin(), small.end()), HasSubstr("font-size=\"19\""));
-  EXPECT_THAT(std::string(large.begin(), large.end()), HasSubstr("font-size=\"15.5"));
+  const std::vector<std::uint8_t> short_title = ReadBytes(scratch / "short.svg"),
+                                  long_title = ReadBytes(scratch / "long.svg");
+  EXPECT_THAT(std::string(short_title.begin(), short_title.end()), HasSubstr("font-size=\"19\""));
+  EXPECT_THAT(std::string(long_title.begin(), long_title.end()), HasSubstr("font-size=\"15.5"));
 }
 
 TEST(Picture, TheSameInputGivesTheSameBytes) {

@@ -111,7 +111,7 @@ TEST_F(CommonRoadTest, ACrossingIsOpen) {
   const World world = Scenario(Lanelet(1, high, low) + Lanelet(2, west, east));
   EXPECT_FALSE(Contains(world, At(0, 2)) || Contains(world, At(2, 0)) || Contains(world, At(0, -2)));
   EXPECT_TRUE(Contains(world, At(-10, 2)) && Contains(world, At(2, 10)) && Contains(world, At(10, -2)));
-  EXPECT_THAT(world.notes, Contains(HasSubstr("4 segments inside another lanelet")));
+  EXPECT_THAT(world.notes, Contains(HasSubstr("4 segments are left out where they lie inside another lanelet")));
 }
 
 // A straight road of two points a side, and a side road that turns into it: what lies in the turn is road.
@@ -125,7 +125,7 @@ TEST_F(CommonRoadTest, ABoundIsOpenAsFarAsAnotherLaneletGoes) {
     EXPECT_TRUE(Contains(world, At(x, 9)) && Contains(world, At(x, 2))) << x;
     EXPECT_FALSE(Contains(world, At(x, 1.9)) || Contains(world, At(x, 0.1))) << x;
   }
-  EXPECT_THAT(world.notes, Contains(HasSubstr("3 segments inside another lanelet")));
+  EXPECT_THAT(world.notes, Contains(HasSubstr("3 segments are left out where they lie inside another lanelet")));
 }
 
 TEST_F(CommonRoadTest, WhatStandsIsItsShapeAtItsState) {

@@ -168,7 +168,7 @@ TEST_F(MapTest, NegatedAndScaledMaps) {
   const World scaled = Map(With("mode: scale"), {.unknown_is_free = true});
   EXPECT_TRUE(Contains(scaled, Middle(1, 1))) << "205 is between the thresholds";
   EXPECT_THAT(Map(Instead("free_thresh", "free_thresh: 0")).notes,
-              Contains(StartsWith("No cell is free: see free_thresh, 0,")));
+              Contains(StartsWith("No cell is free: check free_thresh (0),")));
   EXPECT_THAT(Map(kYaml).notes, Not(Contains(StartsWith("No cell"))));
 }
 
