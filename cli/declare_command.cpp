@@ -390,8 +390,9 @@ Copy the last line of the output into the task file.
 task.between.
 
 --from-data needs no residual either. It proposes a declaration from the task's transitions, and proves nothing; see
-docs/data.md. It says after how many transitions each row is refuted, as affine and as slopes, and has both texts where
-none refutes affine rows. With --hold-out it shows how often fresh transitions contradict what the others propose.
+docs/data.md. It says after how many transitions each row is refuted, as affine and as slopes, and adds a text with
+affine rows, perhaps with a rest, where the transitions allow it. With --hold-out it shows how often fresh transitions
+contradict what the others propose.
 
 Examples:
   forereach declare --config config/bicycle.yaml

@@ -37,8 +37,8 @@ class PythonRobot final : public RobotClient::Robot {
     error_ = error.is_none() ? std::vector<double>() : numbers(error, "state_error");
   }
 
-  // Of a robot that is None, and before its first boundary: no entries. Nothing is executed or reported of it until
-  // then.
+  // Without a robot: what the caller gave at the last boundary. Empty before the first; until then nothing is executed
+  // or reported.
   std::span<const double> state() const override { return robot_.is_none() ? state_ : Numbers("state", state_); }
   std::span<const double> state_error() const override {
     return Has("state_error") ? Numbers("state_error", error_) : error_;

@@ -32,7 +32,7 @@ constexpr Dialect kDialect{.runs = "runs",
                            .unique = "UNIQUE",
                            .partitioned = ""};
 
-// What of the rows that are wanted, each once.
+// SELECT what FROM every table WHERE where; UNION, so each once.
 std::string OfAllTables(const char* what, const char* where) {
   std::string sql;
   Rows::ForEachTable([&](const char* table, auto) {

@@ -1398,7 +1398,7 @@ void TubeMaker::AddRegions(const Query& query, int k, const KnownRows& known, bo
     const auto [lower, upper] = lattice->nodes.Over(query.hull, {}, query.center);
     const Real doubt = in_doubt ? Real(kSeenInDoubles) * lattice->size : Real();
     bounds = {max(bounds.lower, lower - doubt), min(bounds.upper, upper + doubt)};
-    if (axes < 3) return;
+    if (axes < 3) return;  // In three variables single observations count, too (3.20).
   }
   const Row row(problem_.declaration, query, k);
   const Transitions& data = problem_.transitions;

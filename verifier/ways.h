@@ -3,9 +3,9 @@ order of the moves is tried, each way is cut at the sides of regions that it mee
 is looked up among the regions themselves. So is what else they bound, in each piece into which their sides cut a box.
 The certifier's grid (residual/region_grid.h) shares nothing with this.
 
-Where these variables alone decide, ways along edges of a grid are tried, too: its ticks are those of the certifier
-(soundness 3.20), a choice that claims nothing. What is found at its nodes is spread from all observations at once,
-again with slopes from the regions themselves. */
+Where r_k depends only on variables that bound regions, ways along edges of a grid are tried, too: its ticks are those
+of the certifier (soundness 3.20), a choice that claims nothing. What is found at its nodes is spread from all
+observations at once, again with slopes from the regions themselves. */
 #pragma once
 
 #include <array>

@@ -40,7 +40,7 @@ static_assert(static_cast<int>(Cause::kPairwise) == 1 &&
               static_cast<int>(Cause::kBetween) == decision_t::CAUSE_BETWEEN &&
               static_cast<int>(Cause::kBound) == decision_t::CAUSE_BOUND);
 
-// Before a text that SetText has set, as SetText.
+// Puts a text before what SetText wrote; what no longer fits is cut off, as there.
 template <std::size_t N>
 void Prepend(std::string_view text, std::uint8_t (&field)[N]) {
   const std::size_t size = std::min(text.size(), N - 1);
@@ -125,7 +125,8 @@ GateAnswer Gate::Answer(Bytes message, const TimeSource& clock, std::optional<Re
   return answer;
 }
 
-// Apart, as RefuseBatch: a batch takes 62 kB of the stack, below which a single candidate would be decided on.
+// A function of its own, as RefuseBatch: a decoded batch takes 62 kB of stack, which the decision on a candidate would
+// then lie below.
 std::pair<std::vector<std::uint8_t>, std::string> Gate::ChooseIn(Bytes message, std::int64_t now_us,
                                                                  const TimeSource& clock, bool is_refused) {
   const auto batch = Decoded<candidate_batch_t>(message);

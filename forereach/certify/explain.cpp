@@ -49,7 +49,7 @@ std::string BoxText(const std::vector<Region>& regions, int i, const NominalMode
   return text;
 }
 
-// What observations show of an affine row, not what the step finds empty.
+// Whether observations contradict an affine row; false if a step finds its set empty.
 bool IsOfAffineRow(const Decision& decision, const Problem& problem) {
   return decision.outcome == Outcome::kFalsified && decision.cause == Cause::kPairwise &&
          decision.first_observation >= 0 && problem.declaration.affine.Contains(decision.coordinate);

@@ -21,7 +21,7 @@ and are rounded so that the sentence stays true: a clearance down, a depth up.
 @param obstacles those of the call, for their names (NameOf). */
 [[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem,
                                   std::span<const Obstacle> obstacles = {});
-/** The same, where who decided, the plan and its tube are at hand. If the next state has no finite enclosure, it also
+/** The same with the certifier, the plan and its tube. If the next state has no finite enclosure, it also
 says in which direction the observations of an affine row do not vary, or names the operation of the model's text that
 meets its kink or pole (dynamics/unbounded.h); of an affine row that is contradicted it names all observations that show
 it. Not for the certify step. */

@@ -55,13 +55,13 @@ class RegionTable final {
   three variables, with AVX2. @pre the tilt is zero or that of a box in the domain. */
   [[nodiscard]] Bounds Enclose(const RegionGrid::Box& box, const Tilt& tilt = {}) const noexcept;
 
-  /** In one or two variables relative to the slope by which the middle of the bounds rises across the box, along each
-  of its sides that is not far shorter than a strip: whole parts, of which the largest slope has 250.7, so that who
-  derives it again gets the same. @param center of the box, of all variables of z. Cost: that of Enclose, and of four
-  points. */
+  /** In three variables, Enclose. In one or two relative to the slope by which the middle of the bounds rises across
+  the box, along each of its sides that is not far shorter than a strip: whole parts, of which the largest slope has
+  250.7, so that who derives it again gets the same. @param center of the box, of all variables of z. Cost: that of
+  Enclose, and of four points. */
   [[nodiscard]] Bounds EncloseTilted(const RegionGrid::Box& box, std::span<const double> center) const noexcept;
 
-  static constexpr std::size_t kMostSources = 16;
+  static constexpr std::size_t kMostSources = 16;  // two bounds at each of 8 corners
   /** Of three variables: the observations that bound r_k at the corners of z's cell, each once; the rest is -1. */
   [[nodiscard]] std::array<int, kMostSources> Sources(std::span<const double> z) const noexcept;
 
@@ -70,8 +70,8 @@ class RegionTable final {
     int variable;
     std::vector<double> ticks;
     std::size_t stride = 0;  // to the next node
-    // From a node along the axis, infinity where there is no cell: the slope on the face where the axes before it run,
-    // too, and those behind it are at their ticks; and the cost of the edge.
+    // By node: the largest slope along this axis on the face that begins there and spans this axis and those before
+    // it, the least of the cells around; and the cost of the edge. Infinity where there is no cell.
     std::vector<double> slopes{}, costs{};
     double quantum = 0;      // of a tilt; 0: there is none
     double least_width = 0;  // of a box for a tilt

@@ -2,9 +2,9 @@
     max_i [r~_ik - eps_k - D_i(z)] <= r_k(z) <= min_i [r~_ik + eps_k + D_i(z)]   for every z in the hull of Z,
 with D_i(z) the cost of a path from observation i. A row that a table fits (region_table.h) looks up the largest of
 these bounds over the hull, and takes them relative to a slope where they are narrower so. A row without a table takes
-for D_i the largest cost over the hull (RegionGrid::CostUpper), and so does, beside it, a table in three variables for
-its sources. They are intersected with the bounds on |r_k| of the regions that the hull
-meets, and with those of another enclosure, which knows L alone: that sees the zonotope, this one its hull.
+for D_i the largest cost over the hull (RegionGrid::CostUpper); a row with a table in three variables does so, too, for
+RegionTable::Sources. They are intersected with the bounds on |r_k| of the regions that the hull meets, and with those
+of another enclosure, which knows L alone: that sees the zonotope, this one its hull.
 
 Work. Any subset of the observations gives sound bounds. Tables know each that is added. Kept for the rest, and for
 contradictions, are those that narrow a bound at their own location when they are added, and of these the last
@@ -42,7 +42,7 @@ class RegionalEnclosure final : public ResidualEnclosure {
 
   /** Adds an observation, and tests it against those that are kept; the rest is not to be called meanwhile. Cost:
   RegionGrid::CostUpper for each of these, and RegionTable::Spread: milliseconds where it narrows all of a table.
-  @param id above those of before.
+  @param id above all earlier ones.
   @param lower, upper n entries: enclosures of the observed residual. */
   void Add(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
 
