@@ -135,7 +135,7 @@ class Report:
         ] + [
             at_most(f"2,000 cells {place}",
                     [ratio(self.cpu(f"map/{body}/{cells}_2000"), self.cpu(f"map/{body}/none"))
-                     for body in ("point", "rectangle", "rectangle_swept")], 1.5, "sketches of bodies")
+                     for body in ("point", "rectangle", "rectangle_swept")], 1.5, "outlines with the edges between two samples")
             for place, cells in (("along a street, over none: point, rectangle, rectangle at all times", "street"),
                                  ("anywhere, the same", "map"))
         ] + [
