@@ -35,7 +35,8 @@ std::optional<KeyRing> AllKeysOf(const BusOptions& options) {
 }
 
 std::optional<KeyRing> PublicKeysOf(const BusOptions& options) {
-  return ReadOr(options, [&] { return LoadPublicKeys(options.key); });
+  const std::optional<KeyRing> keys = ReadOr(options, [&] { return LoadPublicKeys(options.key); });
+  return keys ? std::optional(keys->Public()) : std::nullopt;
 }
 
 BusOptions WithKeys(BusOptions options, Role role) {

@@ -68,7 +68,8 @@ inline constexpr const char* kUnsignedWarning = "UNSIGNED: anyone on this networ
 [[nodiscard]] std::optional<KeyRing> KeysOf(const BusOptions& options, Role role);
 /** The same for one program that is all processes. */
 [[nodiscard]] std::optional<KeyRing> AllKeysOf(const BusOptions& options);
-/** The same for a reader of logs. */
+/** For a reader of logs, and for the logger, so that both take the same messages for authentic: without the group key,
+whose tags the signatures do not cover. */
 [[nodiscard]] std::optional<KeyRing> PublicKeysOf(const BusOptions& options);
 
 /** The options with these keys in them. */

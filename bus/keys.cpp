@@ -128,6 +128,13 @@ const PublicKey& KeyRing::public_key(Role role) const { return content_->public_
 bool KeyRing::Holds(Role role) const { return content_->holds[At(role)]; }
 bool KeyRing::HoldsGroup() const { return content_->holds_group; }
 
+KeyRing KeyRing::Public() const {
+  auto content = std::make_shared<Content>();
+  content->robot = robot();
+  content->public_keys = content_->public_keys;
+  return KeyRing(std::move(content));
+}
+
 Signature KeyRing::Sign(Role role, Bytes bytes) const {
   if (!Holds(role)) throw std::logic_error("KeyRing: the secret of " + std::string(RoleName(role)) + " is not held");
   Signature signature;
@@ -563,11 +570,7 @@ KeyRing LoadPublicKeys(const std::string& path) {
         names, [&](const std::string& name) { return ::access((path + "/" + name).c_str(), F_OK) == 0; });
     file += "/" + (there == names.end() ? names.front() : *there);
   }
-  const KeyFile key = Load(file);
-  auto content = std::make_shared<KeyRing::Content>();
-  content->robot = key.content->robot;
-  content->public_keys = key.content->public_keys;
-  return KeyRing(std::move(content));
+  return KeyRing(Load(file).content).Public();
 }
 
 }  // namespace forereach

@@ -70,6 +70,8 @@ class KeyRing final {
   [[nodiscard]] bool Holds(Role role) const;
   /** Whether it holds the group key. Every ring does, except one with public keys only. */
   [[nodiscard]] bool HoldsGroup() const;
+  /** The robot and its public keys alone: what readers of logs have. */
+  [[nodiscard]] KeyRing Public() const;
 
   /** The role's Ed25519 signature of `bytes`. @throws std::logic_error if the ring does not hold the role's secret. */
   [[nodiscard]] Signature Sign(Role role, Bytes bytes) const;

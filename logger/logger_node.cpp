@@ -117,8 +117,8 @@ void LoggerNode::SendStatus(std::int64_t now_us, std::int64_t queue_depth) {
   SetText(status.message, !trouble.empty()            ? trouble
                           : !silence.empty()          ? silence
                           : !recorder_.gone().empty() ? fmt::format("recording; {}", recorder_.gone())
-                          : !refused.empty() ? fmt::format("recording; not authentic and in no row: {}", refused)
-                                             : "recording");
+                          : !refused.empty()          ? fmt::format("recording; not authentic: {}", refused)
+                                                      : "recording");
   bus_.Publish(channels_.logger_status, status);
 }
 
@@ -137,7 +137,7 @@ void LoggerNode::Stop() {
   out_ << "\ndatabase                  " << recorder_.database_path() << "\n" << ToText(recorder_.summary());
   if (!recorder_.gone().empty()) out_ << "gone                      " << recorder_.gone() << "\n";
   const std::string refused = DescribeRefusals(refusals());
-  if (!refused.empty()) out_ << "not authentic             " << refused << ", in no row\n";
+  if (!refused.empty()) out_ << "not authentic             " << refused << "\n";
   out_ << std::flush;
 }
 

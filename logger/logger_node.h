@@ -6,8 +6,9 @@ Messages that do not fit are dropped, counted, and become a gap.
 
 With keys, a stranger on the network can neither fill the disk nor displace authentic logs. All authentic messages are
 recorded, with their trailer. Refused messages, and messages on channels that do not belong to ForeReach, are recorded
-only up to logger.unsigned_kb_per_s. Refused messages make no rows; the heartbeat's sentence and the summary at Stop
-have their number. Messages of other channels above the limit become gaps "unsigned". */
+only up to logger.unsigned_kb_per_s. Refused messages make no rows, unless their signatures hold; the heartbeat's
+sentence and the summary at Stop have their number. Messages of other channels above the limit become gaps "unsigned".
+*/
 #pragma once
 
 #include <cstdint>

@@ -109,6 +109,7 @@ struct Dialect {
 
 // Both engines take these types: eight bytes each, in SQLite by the words INT and DOUB in them.
 constexpr const char* TypeOf(std::int64_t) { return "BIGINT NOT NULL"; }
+constexpr const char* TypeOf(int) = delete;
 constexpr const char* TypeOf(double) { return "DOUBLE PRECISION"; }
 constexpr const char* TypeOf(const auto&) { return "TEXT NOT NULL"; }
 template <class Number>

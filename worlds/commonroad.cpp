@@ -341,11 +341,20 @@ class ObstacleReader {
 
 // ---- The road
 
+constexpr std::string_view kNotDriven[] = {"sidewalk", "crosswalk", "bicycleLane"};
+
 struct Lanelet {
   std::string id;
   Ring left, right, area;
   std::string left_id, right_id;  // its neighbours'
   PlanePoint lower, upper;
+  Span height{};
+  bool is_driven = true;  // not for walking or cycling alone
+
+  /** Whether what lies in it is road for who drives on the other one: a bridge is none for the road below. */
+  [[nodiscard]] bool IsRoadFor(const Lanelet& other) const {
+    return this != &other && is_driven && height.lower <= other.height.upper && other.height.lower <= height.upper;
+  }
 };
 
 class RoadReader {
@@ -362,6 +371,7 @@ class RoadReader {
   }
 
   [[nodiscard]] std::size_t count() const { return lanelets_.size(); }
+  [[nodiscard]] auto not_driven() const { return std::ranges::count(lanelets_, false, &Lanelet::is_driven); }
   [[nodiscard]] int inside() const { return inside_; }
 
  private:
@@ -384,6 +394,9 @@ class RoadReader {
     if (lanelet.left.size() < 2 || lanelet.right.size() < 2) in_.Fail(at, "a bound has fewer than two points");
     lanelet.left_id = NeighbourOf(at, "adjacentLeft");
     lanelet.right_id = NeighbourOf(at, "adjacentRight");
+    lanelet.height = HeightOf(at);
+    for (const XmlElement* type : at.All("laneletType"))
+      lanelet.is_driven &= std::ranges::find(kNotDriven, Trimmed(type->text)) == std::end(kNotDriven);
     lanelet.area = lanelet.right;
     lanelet.area.insert(lanelet.area.end(), lanelet.left.rbegin(), lanelet.left.rend());
     lanelet.lower = lanelet.upper = lanelet.area.front();
@@ -394,12 +407,24 @@ class RoadReader {
     return lanelet;
   }
 
+  // Of its points; without z, zero.
+  [[nodiscard]] Span HeightOf(const XmlElement& at) const {
+    Span height{kFarthestPoint, -kFarthestPoint};
+    for (const char* bound : {"leftBound", "rightBound"})
+      for (const XmlElement* point : in_.Require(at, bound).All("point")) {
+        const XmlElement* given = point->Find("z");
+        const double z = given ? in_.Number(*given, -kFarthestPoint, kFarthestPoint) : 0;
+        height = {std::min(height.lower, z), std::max(height.upper, z)};
+      }
+    return height;
+  }
+
   // The parts of the segment where no other lanelet has the road on both sides. A computed end is rounded, and its part
   // grown by that error.
   [[nodiscard]] std::vector<Ring> OffTheRoad(const Lanelet& own, const PlanePoint& a, const PlanePoint& b) const {
     std::vector<const Ring*> areas;
     for (const Lanelet& other : lanelets_)
-      if (&other != &own && other.lower.x <= std::max(a.x, b.x) && std::min(a.x, b.x) <= other.upper.x &&
+      if (other.IsRoadFor(own) && other.lower.x <= std::max(a.x, b.x) && std::min(a.x, b.x) <= other.upper.x &&
           other.lower.y <= std::max(a.y, b.y) && std::min(a.y, b.y) <= other.upper.y)
         areas.push_back(&other.area);
     std::vector<Ring> parts;
@@ -421,7 +446,7 @@ class RoadReader {
     const double x = b.x - a.x, y = b.y - a.y, pieces = std::ceil(std::hypot(x, y) / kPiece);
     if (neighbour.empty() || !(pieces <= kMostPieces)) return false;
     return std::ranges::any_of(lanelets_, [&](const Lanelet& other) {
-      if (&other == &own || other.id != neighbour) return false;
+      if (!other.IsRoadFor(own) || other.id != neighbour) return false;
       for (double i = 0; i <= pieces; ++i)
         if (!IsNearTo(other.area, {a.x + x * (i / pieces), a.y + y * (i / pieces)})) return false;
       return true;
@@ -521,6 +546,9 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
       "inside another lanelet. Lanelets have open ends, and a change to a neighbour's lane in the other direction is "
       "allowed.",
       CommonRoadOptions::kBeside, road.inside()));
+  if (road.not_driven() > 0)
+    world.notes.push_back(fmt::format("{} lanelets are {}: no road, so bounds beside and under them stay.",
+                                      road.not_driven(), fmt::join(kNotDriven, ", ")));
   if (obstacles.without_orientation() > 0)
     world.notes.push_back(
         fmt::format("{} states have no orientation: there an obstacle covers what it does whichever way it looks.",

@@ -18,7 +18,8 @@ struct CommonRoadOptions {
 };
 
 /** The boundary is each lanelet's left bound but where it lies along its left neighbour, and its right bound likewise,
-and except where it lies inside another lanelet, as in crossings; lanelets have open ends. So what lies between two
+and except where it lies inside another lanelet, as in crossings; lanelets have open ends. A lanelet for walking or
+cycling, or one at another height, counts as none there. So what lies between two
 neighbours, as a median does, is no road, nor what is beyond the end of a neighbour. A segment is a set without width,
 which certificates at all times do not let through.
 

@@ -402,7 +402,7 @@ void Gate::KeepWarm() noexcept {
     if (CheckBytes(bytes, candidate) || CheckContent(candidate, initial_set) || CheckTimes(candidate, now_us)) return;
     // By a clock that leaves no time for pieces.
     Certify(
-        candidate, initial_set, [end = EarliestStart(now_us)] { return end; }, answer);
+        candidate, initial_set, [] { return INT64_MAX / 2; }, answer);
     static_cast<void>(Encode(answer.decision));
     if (answer.certified) static_cast<void>(Encode(*answer.certified));
   } catch (const std::exception&) {  // nobody waits for it

@@ -41,7 +41,8 @@ class RegionalEnclosure final : public ResidualEnclosure {
   void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
 
   /** Adds an observation, and tests it against those that are kept; the rest is not to be called meanwhile. Cost:
-  RegionGrid::CostUpper for each of these, and RegionTable::Spread: milliseconds where it narrows all of a table.
+  RegionGrid::CostUpper for each of these, and RegionTable::Spread: tens of milliseconds where it narrows all of a
+  table.
   @param id above all earlier ones.
   @param lower, upper n entries: enclosures of the observed residual. */
   void Add(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper);

@@ -188,6 +188,27 @@ TEST_F(SignedLoggerTest, AMessageSignedLongBeforeMakesNoRow) {
   EXPECT_EQ(node.recorder().interpreter().refusals().old, 1);
 }
 
+// The logger has the group key, readers of its log have not: TearDown holds its rows against theirs.
+TEST_F(SignedLoggerTest, WhateverBitIsFlippedItsRowsAreThoseThatReadersMake) {
+  config_.bus.keys = LoadKeys(config_.bus.key, Role::kLogger);
+  LoggerNode node(config_, bus_, out_);
+  node.Tick(kStart);
+  const auto decision = [&](int sequence) {
+    return planner_->Sign(Role::kCertifier, "PLAN_DECISION",
+                          Encode(MakeDecision(MakeCandidate(sequence, sequence), sequence, decision_t::CERTIFIED, 0)),
+                          bus_.now_us);
+  };
+  const std::size_t size = decision(0).size();
+  for (std::size_t i = 1; i <= size; ++i) {
+    auto flipped = decision(static_cast<int>(i));
+    flipped[size - i] ^= static_cast<std::uint8_t>(1U << i % 8);
+    bus_.Publish("PLAN_DECISION", Bytes(flipped));
+  }
+  node.Tick(bus_.now_us += 600'000);
+  node.Stop();
+  EXPECT_EQ(ReadRows().decisions.size(), sizeof(GroupTag)) << "its signature covers all but the tag";
+}
+
 TEST_F(LoggerNodeTest, RecordsAnOverflowOfItsQueueOnce) {
   config_.logger.queue = 4;
   LoggerNode node(config_, bus_, out_);

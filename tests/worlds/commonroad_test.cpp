@@ -1,6 +1,8 @@
 // Scenarios of CommonRoad: what a vehicle covers at any time between two of its states is in the world then.
 #include "worlds/commonroad.h"
 
+#include <regex>
+
 #include <fmt/format.h>
 
 #include "task/config_error.h"
@@ -126,6 +128,30 @@ TEST_F(CommonRoadTest, ABoundIsOpenAsFarAsAnotherLaneletGoes) {
     EXPECT_FALSE(Contains(world, At(x, 1.9)) || Contains(world, At(x, 0.1))) << x;
   }
   EXPECT_THAT(world.notes, Contains(HasSubstr("3 segments are left out where they lie inside another lanelet")));
+}
+
+// Nobody drives off the road along a crosswalk, from a bridge or onto a cycle lane.
+TEST_F(CommonRoadTest, ABoundStaysUnderALaneletThatIsNoRoadForIt) {
+  const std::string road = Lanelet(1, {{-20, 2}, {20, 2}}, {{-20, -2}, {20, -2}});
+  const auto crossed_by = [&](const std::string& type) {
+    return Scenario(road + Lanelet(2, {{-3, 9}, {-3, -9}}, {{4, 9}, {4, -9}}, type));
+  };
+  EXPECT_FALSE(Contains(crossed_by("<laneletType>urban</laneletType>"), At(0, 2)));
+  for (const std::string type : {"crosswalk", "sidewalk", "bicycleLane"}) {
+    const World world = crossed_by("<laneletType>urban</laneletType><laneletType> " + type + " </laneletType>");
+    EXPECT_TRUE(Contains(world, At(0, 2)) && Contains(world, At(0, -2))) << type;
+    EXPECT_FALSE(Contains(world, At(-3, 0))) << "its own bounds do not close the road";
+    EXPECT_THAT(world.notes, Contains(HasSubstr("1 lanelets are sidewalk, crosswalk, bicycleLane: no road")));
+  }
+  for (const double z : {0.0, 0.5, 6.0}) {
+    const std::string bridge = std::regex_replace(Lanelet(2, {{-3, 9}, {-3, -9}}, {{4, 9}, {4, -9}}),
+                                                  std::regex("</point>"), fmt::format("<z>{}</z></point>", z));
+    EXPECT_EQ(Contains(Scenario(road + bridge), At(0, 2)), z > 0) << z;
+  }
+  const World beside =
+      Scenario(Lanelet(1, {{0, 4}, {40, 4}}, {{0, 0}, {40, 0}}, "<adjacentLeft ref=\"2\" drivingDir=\"same\"/>") +
+               Lanelet(2, {{0, 6}, {40, 6}}, {{0, 4}, {40, 4}}, "<laneletType>bicycleLane</laneletType>"));
+  EXPECT_TRUE(Contains(beside, At(10, 4)));
 }
 
 TEST_F(CommonRoadTest, WhatStandsIsItsShapeAtItsState) {
