@@ -77,9 +77,9 @@ struct Tent {
 template <std::size_t kAll>
 struct CellRow {
   const std::array<double, 2>* values;
-  std::array<const double*, kAll> slopes;
-  std::array<std::size_t, kAll> strides;
-  std::array<Lanes, kAll> tilt;
+  std::array<const double*, kAll> slopes{};
+  std::array<std::size_t, kAll> strides{};
+  std::array<Lanes, kAll> tilt{};
   // Of the cell: its sides, the parts that are asked for, and what the tilt takes off at their ends.
   std::array<std::array<double, 2>, kAll> side{}, part{};
   std::array<std::array<Lanes, 2>, kAll> taken{};
