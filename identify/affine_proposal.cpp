@@ -9,7 +9,6 @@
 #include "forereach/certify/certifier.h"
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/size.h"
-#include "forereach/residual/affine_set.h"
 #include "forereach/residual/consistency.h"
 
 namespace forereach {
@@ -28,22 +27,6 @@ std::optional<int> FirstThat(int low, int high, const Holds& holds) {
     (holds(middle) ? high : low) = middle;
   }
   return high;
-}
-
-// What the observations leave of row k, with the columns, the rest and the errors of `declaration`.
-AffineSet AffineSetOf(const Declaration& declaration, const Observations& observations, int k, const Domain& domain) {
-  const auto [lower, upper] = domain.Corners();
-  Eigen::VectorXd rest;
-  if (declaration.affine.rest.size() > 0) rest = declaration.affine.rest.row(k);
-  AffineSet set(declaration.affine.columns, lower, upper, {rest.data(), ToSize(rest.size())});
-  const double error = declaration.ObservationError(k);
-  for (int i = 0; i < observations.size(); ++i) {
-    const Eigen::VectorXd z = observations.z.row(i);
-    set.Add(i, {z.data(), ToSize(z.size())}, SubDown(observations.lower(i, k), error),
-            AddUp(observations.upper(i, k), error));
-  }
-  set.Derive();
-  return set;
 }
 
 class AffineJudge {
@@ -68,7 +51,8 @@ class AffineJudge {
   [[nodiscard]] const std::vector<int>& columns() const { return errors_.affine.columns; }
 
   [[nodiscard]] JudgedRow Judge(int k) const {
-    JudgedRow judged{k, RefuteAffine(k), RefuteSlopes(k), Eigen::RowVectorXd::Zero(scales_.size())};
+    JudgedRow judged{k, RefuteAffine(errors_, observations_, k, domain_), RefuteSlopes(k),
+                     Eigen::RowVectorXd::Zero(scales_.size())};
     if (judged.affine) judged.left = RestOf(k);
     judged.rest_share = scales_.dot(judged.left) / scales_.dot(proposal_.rows[ToSize(k)].smallest.slopes);
     return judged;
@@ -92,17 +76,6 @@ class AffineJudge {
   }
 
  private:
-  [[nodiscard]] std::optional<Refutation> RefuteAffine(int k) const {
-    const auto shown = [&](int n) {
-      return AffineSetOf(errors_, FirstOf(observations_, n), k, domain_).contradiction();
-    };
-    const auto after = FirstThat(0, observations_.size(), [&](int n) { return shown(n).has_value(); });
-    if (!after) return std::nullopt;
-    Refutation found{*after, shown(*after)->rows};
-    std::ranges::sort(found.by);
-    return found;
-  }
-
   [[nodiscard]] std::optional<Refutation> RefuteSlopes(int k) const {
     const int half = observations_.size() / 2;
     if (half == 0) return std::nullopt;
@@ -142,6 +115,33 @@ class AffineJudge {
 };
 
 }  // namespace
+
+AffineSet AffineSetOf(const Declaration& declaration, const Observations& observations, int k, const Domain& domain) {
+  const auto [lower, upper] = domain.Corners();
+  Eigen::VectorXd rest;
+  if (declaration.affine.rest.size() > 0) rest = declaration.affine.rest.row(k);
+  AffineSet set(declaration.affine.columns, lower, upper, {rest.data(), ToSize(rest.size())});
+  const double error = declaration.ObservationError(k);
+  for (int i = 0; i < observations.size(); ++i) {
+    const Eigen::VectorXd z = observations.z.row(i);
+    set.Add(i, {z.data(), ToSize(z.size())}, SubDown(observations.lower(i, k), error),
+            AddUp(observations.upper(i, k), error));
+  }
+  set.Derive();
+  return set;
+}
+
+std::optional<Refutation> RefuteAffine(const Declaration& declaration, const Observations& observations, int k,
+                                       const Domain& domain) {
+  const auto shown = [&](int n) {
+    return AffineSetOf(declaration, FirstOf(observations, n), k, domain).contradiction();
+  };
+  const auto after = FirstThat(0, observations.size(), [&](int n) { return shown(n).has_value(); });
+  if (!after) return std::nullopt;
+  Refutation found{*after, shown(*after)->rows};
+  std::ranges::sort(found.by);
+  return found;
+}
 
 AffineProposal ProposeAffine(const Problem& problem, const Observations& observations,
                              const ProposedDeclaration& proposal, const ProposalOptions& options) {

@@ -6,15 +6,26 @@ after how many. Nothing that is proposed is proven. */
 #include <string>
 #include <vector>
 
+#include "forereach/residual/affine_set.h"
 #include "identify/proposal.h"
 
 namespace forereach {
+
+/** What the observations leave of row k, with the columns, the rest and the errors of `declaration`. Cost: one Derive.
+ */
+[[nodiscard]] AffineSet AffineSetOf(const Declaration& declaration, const Observations& observations, int k,
+                                    const Domain& domain);
 
 /** So many observations, in their order, refute a declaration. */
 struct Refutation {
   int after = 0;
   std::vector<int> by;  ///< Few of them that refute it alone, ascending.
 };
+
+/** That no M z + b agrees with row k, for the same; none if all observations agree with one. Cost: some tens of Derive.
+ */
+[[nodiscard]] std::optional<Refutation> RefuteAffine(const Declaration& declaration, const Observations& observations,
+                                                     int k, const Domain& domain);
 
 /** What the observations say of one row that needs slopes, with the proposed sigma and w^. */
 struct JudgedRow {

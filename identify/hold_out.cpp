@@ -11,6 +11,7 @@
 #include "forereach/residual/lipschitz_row.h"
 #include "forereach/residual/observation_index.h"
 #include "forereach/residual/pairs.h"
+#include "identify/affine_proposal.h"
 
 namespace forereach {
 namespace {
@@ -48,6 +49,18 @@ void Mark(const Declaration& declaration, const Observations& all, int first, in
       contradicts[ToSize(j - first)] = true;
 }
 
+// The same for an affine row: what the first observations allow at the place of another misses what that one shows.
+void MarkAffine(const AffineSet& set, const Declaration& declaration, const Observations& judged, int k,
+                std::vector<bool>& contradicts) {
+  const double error = declaration.ObservationError(k);
+  for (int j = 0; j < judged.size(); ++j) {
+    const Eigen::VectorXd z = judged.z.row(j);
+    const Interval allowed = set.Enclose({z.data(), ToSize(z.size())});
+    if (SubDown(judged.lower(j, k), error) > allowed.upper || AddUp(judged.upper(j, k), error) < allowed.lower)
+      contradicts[ToSize(j)] = true;
+  }
+}
+
 }  // namespace
 
 Split SplitByTime(int count, int blocks) {
@@ -83,7 +96,11 @@ ContradictionCounts CountContradictions(const Problem& problem, const Declaratio
   const Observations learned = observe(split.learn), judged = observe(split.judge);
   const Observations all = Joined(learned, judged);
   std::vector<bool> contradicts(ToSize(judged.size()), false);
-  for (int k = 0; k < all.num_states(); ++k) Mark(declaration, all, learned.size(), k, contradicts);
+  for (int k = 0; k < all.num_states(); ++k)
+    if (declaration.affine.Contains(k))
+      MarkAffine(AffineSetOf(declaration, learned, k, problem.domain), declaration, judged, k, contradicts);
+    else
+      Mark(declaration, all, learned.size(), k, contradicts);
   ContradictionCounts found;
   found.transitions = judged.size();
   found.contradicting = static_cast<int>(std::ranges::count(contradicts, true));

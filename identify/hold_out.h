@@ -24,13 +24,15 @@ struct Split {
 [[nodiscard]] Transitions RowsOf(const Transitions& transitions, const std::vector<Split::Block>& blocks);
 
 /** What the judging blocks say against a declaration and the learning transitions. A transition counts if it provably
-contradicts one of the learning transitions; those among each other do not count. */
+contradicts one of the learning transitions or, in an affine row, what they leave of it; those among each other do not
+count. */
 struct ContradictionCounts {
   int transitions = 0, contradicting = 0;
   int blocks = 0, blocks_contradicting = 0;
 };
 
-/** Cost: one descent of a search tree over the learning transitions for each judging one and each row of L. */
+/** Cost: one descent of a search tree over the learning transitions for each judging one and each row of L; of an
+affine row, AffineSet::Derive and Enclose. */
 [[nodiscard]] ContradictionCounts CountContradictions(const Problem& problem, const Declaration& declaration,
                                                       const Split& split);
 

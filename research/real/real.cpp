@@ -121,6 +121,7 @@ struct Study {
   std::vector<Drive> drives, at_stamps, others;  // the second: the first, with commands where the log has them
   std::vector<Trial> trials;
   std::vector<std::pair<std::string, std::vector<HiddenState>>> hidden;  // of each drive
+  std::vector<Cells> refuted;                                            // that rows are affine
 
   [[nodiscard]] static std::string NamesOf(const std::vector<Stretch>& stretches) {
     std::string names;
@@ -147,6 +148,11 @@ struct Study {
     Add("leave one out", stamped, at_stamps[i], "w that grows, commands where the log has them",
         Learn(FitTo(driving, stamped), {.quantile = kChosen, .growing = true}));
     Add("leave one out", rest, out, kGrowing, Learn(fitted, {.quantile = kChosen, .growing = true}));
+    for (const double quantile : {kChosen, 0.97}) {  // the second contradicts as often as w alone
+      const Learned affine = Learn(fitted, {.quantile = quantile, .growing = true, .affine = true});
+      Add("leave one out", rest, out, "w that grows, affine rows, quantile " + Text("%g", quantile), affine, quantile);
+      if (quantile == kChosen) RefuteAffineRows(fitted, affine, rest);
+    }
     constexpr double kMore = 0.99;  // regions take some of it back
     Add("leave one out", rest, out, "w that grows, less in 3 regions, quantile 0.99",
         Learn(fitted, {.quantile = kMore, .growing = true, .cells = 3}), kMore);
@@ -158,6 +164,15 @@ struct Study {
     for (const double quantile : quantiles) {
       AddUp(i == 0, fitted, out, quantile);
       Add("itself", Whole(out), out, kGrowing, Learn(own, {.quantile = quantile, .growing = true}), quantile);
+    }
+  }
+  void RefuteAffineRows(const Fitted& fitted, const Learned& affine, const std::vector<Stretch>& from) {
+    for (const bool disturbed : {false, true}) {
+      refuted.push_back({NamesOf(from), std::to_string(fitted.transitions.size()), disturbed ? "declared" : "0"});
+      for (const int k : affine.problem->declaration.affine.rows) {
+        const auto found = RefuteAffine(fitted, affine, k, disturbed);
+        refuted.back().push_back(found ? std::to_string(found->after) : "-");
+      }
     }
   }
   // The trial of a quantile has the counts of all drives that are left out.
@@ -266,6 +281,9 @@ std::string Report(const Study& study, const Learned& all, const Fit& fit, const
          TableOf(study.trials, "quantile", Join({kQuantile}, kOutcome)) +
          "\nOf each drive, learned from it and judged by it; w grows.\n" +
          TableOf(study.trials, "itself", Join({kJudgedBy, kQuantile}, kOutcome)) +
+         "\n## Affine rows\nSo many steps of the drives, in their order, refute that the residual of a state is "
+         "affine.\n" +
+         Markdown({"drives", "N", "w", "yaw", "v", "r"}, study.refuted) +
          "\n## Hidden states\nWhat the best fit to a drive leaves of its errors, where a line in a further state is "
          "taken off them.\n" +
          Hidden(study) + "\n## One-step errors\nOf all drives, in m, rad, m/s, rad/s; w grows.\n" + AboutFit(all, fit);

@@ -225,6 +225,20 @@ void Calm(Problem& problem, const std::vector<int>& felt, const LearnOptions& op
   }
 }
 
+void DeclareAffine(Problem& problem, const std::vector<int>& felt) {
+  constexpr double kLeast = 1e-6;  // a slope that counts has to be declared
+  Declaration& declaration = problem.declaration;
+  const Observations seen = Observe(*problem.model, declaration, problem.transitions);
+  Eigen::MatrixXd phi(seen.size(), std::ssize(felt) + 1);
+  phi << seen.z(Eigen::all, felt), Eigen::VectorXd::Ones(seen.size());
+  const Eigen::MatrixXd planes = phi.colPivHouseholderQr().solve((seen.lower + seen.upper) / 2);
+  declaration.affine = {{kYaw, kV, kR}, felt};
+  for (const int k : declaration.affine.rows)
+    for (std::size_t j = 0; j < felt.size(); ++j)
+      if (declaration.VariableError(felt[j]) > 0)
+        declaration.lipschitz(k, felt[j]) = std::max(2 * std::abs(planes(static_cast<Eigen::Index>(j), k)), kLeast);
+}
+
 // ---- judging
 
 // Whether transition i begins where the one before it ends.
@@ -341,6 +355,7 @@ Learned Learn(const Fitted& fitted, const LearnOptions& options) {
     declaration.growing = std::make_shared<const GrowingDisturbance>(*problem->model, std::move(bounds));
     KeepOnly(RowsWithoutResidual(*problem), *problem);
     if (options.cells > 1) Calm(*problem, fitted.felt, options);
+    if (options.affine) DeclareAffine(*problem, fitted.felt);
   } else {
     declaration.noise_bound = fitted.state_error.array() + kRounding;
     declaration.disturbance = (QuantilesOf(fitted.fit.after, options.quantile) - declaration.noise_bound).cwiseMax(0);
@@ -351,6 +366,13 @@ Learned Learn(const Fitted& fitted, const LearnOptions& options) {
   }
   learned.left_out = all.size() - problem->transitions.size();
   return learned;
+}
+
+std::optional<Refutation> RefuteAffine(const Fitted& fitted, const Learned& affine, int k, bool disturbed) {
+  Declaration declaration = affine.problem->declaration;
+  if (!disturbed) declaration.disturbance.setZero(), declaration.growing.reset();
+  return forereach::RefuteAffine(declaration, Observe(*affine.problem->model, declaration, fitted.transitions), k,
+                                 affine.problem->domain);
 }
 
 Learned Proposed(const Fitted& fitted) {

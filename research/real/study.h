@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "forereach/certify/problem.h"
+#include "identify/affine_proposal.h"
 #include "identify/fit.h"
 #include "research/real/recording.h"
 
@@ -60,6 +61,9 @@ struct LearnOptions {
   bool growing = false;
   /** And less of the s_k a_k in up to so many regions, where the transitions that stay need less, by this factor. */
   int cells = 1;
+  /** And the residuals of yaw, v and r affine in the felt columns, which are otherwise constant. As far as states have
+  errors, slopes up to twice those of the plane that fits best are declared. */
+  bool affine = false;
   double calm_factor = 1.5;
   /** The domain's ranges are those of these; empty: of those that the model was fitted to. */
   std::vector<Stretch> domain_of = {};
@@ -78,6 +82,11 @@ widened by a tenth, since a tube needs room. Cost: some seconds for slopes. */
 [[nodiscard]] Learned Learn(const Fitted& fitted, const LearnOptions& options);
 /** The same with `factor` times the slopes. */
 [[nodiscard]] Learned WithSlopesTimes(const Learned& learned, double factor);
+
+/** Whether all transitions, those that were left out among them, refute that the residual of state k is affine.
+@param affine learned so. @param disturbed with its w, or with errors of the record alone. */
+[[nodiscard]] std::optional<Refutation> RefuteAffine(const Fitted& fitted, const Learned& affine, int k,
+                                                     bool disturbed);
 
 /** What `forereach declare --from-data` proposes, which knows of no drives: slopes, and a disturbance from the scatter
 of near places. State errors are declared as such. Cost: some seconds. */

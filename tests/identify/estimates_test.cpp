@@ -273,6 +273,28 @@ TEST_F(HoldOutTest, CountsEachFreshTransitionThatContradictsALearnedOne) {
   EXPECT_GT(CountContradictions(problem_, declaration_, SplitByTime(120, 8)).contradicting, 0);
 }
 
+TEST_F(HoldOutTest, AnAffineRowIsJudgedByWhatTheLearnedOnesLeaveOfIt) {
+  // 0.1 v + 0.2, within 0.001 at v = 0 and at 1: at 2 within 0.003, and what is seen there is within another 0.001.
+  const auto contradicting = [&](double second_v, double off) {
+    Transitions& data = problem_.transitions;
+    data.z = Eigen::MatrixXd::Zero(4, 6);
+    data.z.col(2) << 0, second_v, 2, 2;
+    data.x_next = Eigen::MatrixXd(4, 4);
+    Eigen::Vector4d x;
+    for (Eigen::Index i = 0; i < 4; ++i) {
+      const Eigen::VectorXd z = data.z.row(i);
+      problem_.model->Evaluate({z.data(), 6}, {x.data(), 4});
+      x[2] += 0.1 * z[2] + 0.2 + (i < 2 ? 0 : i == 2 ? off : -off);
+      data.x_next.row(i) = x;
+    }
+    return CountContradictions(problem_, declaration_, {{{0, 2}}, {{2, 4}}}).contradicting;
+  };
+  declaration_.affine = {{2}, {2}};
+  EXPECT_EQ(contradicting(1, 0.003999), 0);
+  EXPECT_EQ(contradicting(1, 0.004001), 2);
+  EXPECT_EQ(contradicting(0, 9), 0) << "one speed leaves every slope";
+}
+
 TEST_F(HoldOutTest, WhatTheErrorsOfTheRecordExplainDoesNotContradict) {
   const Split split = SplitByTime(120, 8);
   EXPECT_GT(CountContradictions(problem_, declaration_, split).contradicting, 0);
