@@ -106,7 +106,9 @@ TEST_F(AffineRowsCommandTest, AKinkRefutesItAfterSoManyTransitionsAndNotOneSoone
   Write({rows_.begin(), rows_.begin() + after});
   EXPECT_EQ(Affine()["rows"][0]["affine_refuted"]["after"], after);
   Write({rows_.begin(), rows_.begin() + after - 1});
-  for (const Json& each : Affine()["rows"]) EXPECT_EQ(each["affine_refuted"], nullptr);
+  const Json whole = Affine()["rows"];
+  ASSERT_FALSE(whole.empty());
+  for (const Json& each : whole) EXPECT_EQ(each["affine_refuted"], nullptr);
   std::vector<std::string> few;
   for (const int line : lines) few.push_back(rows_[static_cast<std::size_t>(line) - 2]);
   Write(few);
