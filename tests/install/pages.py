@@ -33,6 +33,7 @@ NOT_RUN = {
     ("examples/python/README.md", "forereach keygen --robot rover keys"): "four terminals; tests/python/bus_test.py",
     ("research/higher-order-car.md", "research/run drift"): "research",
     ("research/higher-order-car.md", "research/run drift --drive"): "research",
+    ("research/affine.md", "research/run affine"): "research",
     ("research/regions.md", "research/run regional"): "research",
     ("research/real-car.md", "research/run real --data FOLDER --other FOLDER/car_1_Datarecording_09_16_2024_10_12_05.csv"): "research",
 }
