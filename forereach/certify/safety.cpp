@@ -276,6 +276,13 @@ class SafetyTest::Unit {
     return obstacle.motion() ? meeting_ = Meet(*obstacle.motion(), schedule_, first_, last_) : kStands;
   }
 
+  [[nodiscard]] const Placement::Sample& SampleAt(int t) noexcept {
+    const std::size_t half = ToSize(t % 2);
+    if (observed_[half] != t) placement().Observe(tube_.slice(t), tube_.half_width(t), samples_[half]);
+    observed_[half] = t;
+    return samples_[half];
+  }
+
  private:
   [[nodiscard]] const Placement& placement() const { return test_.placement_; }
 
@@ -297,13 +304,6 @@ class SafetyTest::Unit {
   void EncloseHull(int t, Hull& hull) noexcept {
     if (placement().has_expressions()) return placement().EncloseHull(SampleAt(t), hull);
     placement().EncloseHull(tube_.slice(t), tube_.half_width(t), hull);
-  }
-
-  [[nodiscard]] const Placement::Sample& SampleAt(int t) noexcept {
-    const std::size_t half = ToSize(t % 2);
-    if (observed_[half] != t) placement().Observe(tube_.slice(t), tube_.half_width(t), samples_[half]);
-    observed_[half] = t;
-    return samples_[half];
   }
 
   [[nodiscard]] const Zonotope* PlacesAt(int t) noexcept {
@@ -510,7 +510,7 @@ class SafetyTest::Judgement {
     if (has_boxes()) EncloseBodies();
     if (!has_boxes() || index.has_moving() || !index.everywhere().empty()) EncloseHulls();
     MeasureHulls();
-    if (!test_.placement_.has_expressions()) Dispatch<&Judgement::FindNearest>(test_.instructions_, *this, index);
+    Dispatch<&Judgement::FindNearest>(test_.instructions_, *this, index);
     SeeNear(index, first_, units_);
     if (index.has_moving()) SeeMoving(index);
     if (!index.everywhere().empty()) SeeEverywhere(index);
@@ -607,7 +607,10 @@ class SafetyTest::Judgement {
     Hull after{};
     for (int t = units_ - 1 + span(); t >= first_; --t) {
       const std::size_t i = ToSize(t - first_);
-      placement.PoseOver(tube_.slice(t), tube_.half_width(t), poses_[i], test_.instructions_);
+      if (placement.has_expressions())
+        placement.PoseOver(unit_.SampleAt(t), poses_[i], test_.instructions_);
+      else
+        placement.PoseOver(tube_.slice(t), tube_.half_width(t), poses_[i], test_.instructions_);
       const Hull body = placement.EncloseBody(poses_[i], test_.instructions_);
       if (t < units_) bodies_[i] = span() == 0 ? body : AroundBoth(body, after);
       after = body;
@@ -688,12 +691,12 @@ class SafetyTest::Judgement {
     std::size_t count = 0;
     const double reach = judgement.has_boxes() ? 0 : judgement.test_.placement_.reach();
     const auto gather = [&](int t) {
-      const bool has_poses = judgement.HasPoses(t);
+      const bool is_refinable = judgement.IsRefinable(t);
       judgement.ForEachNear(
           index, t, [&] { return count > near.size() ? -kInfinity : judgement.farthest(); },
           [&](int o, double least) {
             if (count > near.size()) return;
-            Near pair{t, o, least - reach, !has_poses};
+            Near pair{t, o, least - reach, !is_refinable};
             if (t == judgement.approached_.t && o == judgement.approached_.o)
               pair = judgement.approached_;
             else if (pair.gap < judgement.nearest_gap_)
@@ -725,7 +728,7 @@ class SafetyTest::Judgement {
     for (int t = judgement.units_ - 1; t >= judgement.first_; t -= 2)
       if (const BoxTree::Found found = index.FindNear(judgement.hull(t), judgement.GapOf(t)); found.square < least) {
         least = found.square;
-        nearest = {t, found.box, 0, !judgement.HasPoses(t)};
+        nearest = {t, found.box, 0, !judgement.IsRefinable(t)};
       }
     if (nearest.o < 0) return;
     nearest.gap = std::sqrt(least) - (judgement.has_boxes() ? 0 : judgement.test_.placement_.reach());
@@ -743,14 +746,12 @@ class SafetyTest::Judgement {
         size_ = size;
   }
 
-  // What is further is not the closest. Where places of the body are not known before they are enclosed, not yet.
-  [[nodiscard]] double farthest() const noexcept {
-    return test_.placement_.has_expressions() ? 0 : std::min(closest_.clearance, farthest_);
-  }
+  // What is further is not the closest.
+  [[nodiscard]] double farthest() const noexcept { return std::min(closest_.clearance, farthest_); }
   // How many samples a unit has besides its first one.
   [[nodiscard]] int span() const { return span_; }
   // Whether boxes around the body are searched; otherwise hulls of its places, with its reach.
-  [[nodiscard]] bool has_boxes() const { return has_boxes_; }
+  [[nodiscard]] bool has_boxes() const { return !is_at_frame(); }
 
   // More than a search for the best direction may lose of a distance.
   [[nodiscard]] double WithTolerance(const ObstacleIndex& index, double distance) const noexcept {
@@ -957,7 +958,7 @@ class SafetyTest::Judgement {
       std::size_t j = first;
       for (int s = 0; s <= span(); ++s)
         for (int i = part.first; i < part.first + part.count; ++i, ++j) {
-          const auto side = test_.placement_.Side(poses_[ToSize(t - first_ + s)], i);
+          const auto side = test_.placement_.Side(poses_[ToSize(t - first_ + s)], part, i);
           outline.x[j] = side[0];
           outline.y[j] = side[1];
         }
@@ -978,8 +979,7 @@ class SafetyTest::Judgement {
       for (std::size_t i = ToSize(part.first); i < ToSize(part.first + part.count); ++i)
         at_sample = Max(x * AllLanes(pose.middle[0][i]) + y * AllLanes(pose.middle[1][i]) + AllLanes(pose.around[i]),
                         at_sample);
-      const auto& width = pose.frame.half_width;
-      farthest = Max(at_sample + Abs(x) * AllLanes(width[0]) + Abs(y) * AllLanes(width[1]), farthest);
+      farthest = Max(at_sample + Abs(x) * AllLanes(pose.width[0]) + Abs(y) * AllLanes(pose.width[1]), farthest);
     }
     return farthest + AllLanes(part.radius);
   }
@@ -1002,9 +1002,11 @@ class SafetyTest::Judgement {
   }
 
   // Whether pairs of a unit can be refined.
-  [[nodiscard]] bool HasPoses(int t) const noexcept { return has_boxes() && test_.placement_.dim() == 2 && IsKnown(t); }
+  [[nodiscard]] bool IsRefinable(int t) const noexcept {
+    return has_boxes() && test_.placement_.dim() == 2 && !test_.placement_.has_expressions() && IsKnown(t);
+  }
   // Raises a pair's bound to about its distance, or above `far`, and lowers farthest_ to that from above. @pre
-  // HasPoses.
+  // IsRefinable.
   void Refine(Near& pair, double far) noexcept {
     Dispatch<&Judgement::RefinePair>(test_.instructions_, *this, pair, far);
   }
@@ -1121,12 +1123,6 @@ class SafetyTest::Judgement {
       for (Pair& pair : nearest_.InOrder(closest_.clearance, least)) ConsiderIfCloser(pair);
     else if (index == nullptr || index->has_moving() || !index->everywhere().empty())
       LookAgain();
-    for (int t = first_; index != nullptr && test_.placement_.has_expressions() && t < units_; ++t)
-      ForEachNear(
-          *index, t, [&] { return closest_.clearance; },
-          [&](int o, double) {
-            static_cast<void>(ConsiderNear(*index, {t, o, 0, true}));
-          });
   }
 
   // At those for which there was no room.
@@ -1159,7 +1155,6 @@ class SafetyTest::Judgement {
   const SafetyTest& test_;
   const ObstacleView& obstacles_;
   const int first_, units_, span_ = test_.placement_.sweeps() ? 1 : 0;
-  const bool has_boxes_ = !is_at_frame() && !test_.placement_.has_expressions();
   const Tube& tube_;
   const Schedule& schedule_;
   const ConvexNumbers numbers_;

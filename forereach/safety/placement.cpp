@@ -155,14 +155,16 @@ Placement::Placement(const Eigen::MatrixXd& projection, const Body& body, const 
           {q, length, turned, length + std::abs(q[2]) + turned + std::max({bulge_[0], bulge_[1], bulge_[2]})});
       reach_ = std::max(reach_, AddUp(AddUp(LengthUpper(q[0], q[1], q[2]), points_.back().turn), part.radius));
     }
-    FindSides(parts_.back());
   }
   Require(reach_ < kInfinity, "body: its size is not finite");
   for (std::size_t i = 0; i < PaddedToLanes(points_.size()); ++i) {
     const Point& point = points_[std::min(i, points_.size() - 1)];
-    outline_.x[i] = point.place[0], outline_.y[i] = point.place[1], outline_.z[i] = point.place[2];
+    for (std::size_t k = 0; k < kMaxSafetyDim; ++k) outline_.place[k][i] = point.place[static_cast<Eigen::Index>(k)];
     outline_.length[i] = point.length, outline_.turn[i] = point.turn, outline_.size[i] = point.size;
   }
+  for (const Part& part : parts_)
+    for (int i = part.first; dim() == 2 && i < part.first + part.count; ++i)
+      points_[ToSize(i)].side = SideOf(part, i, outline_.place);
   for (const Part& part : parts_)
     for (std::size_t i = ToSize(part.first); i < PaddedToLanes(points_.size()); ++i) outline_.radius[i] = part.radius;
   Require(!has_frame_ || !projection_.entries().empty(), "projection: is zero");
@@ -216,13 +218,14 @@ void Placement::PoseInline(const Zonotope& slice, std::span<const double> half_w
   const auto& c = pose.frame.center;
   for (std::size_t k = 0; k < ToSize(dim()); ++k) size += std::abs(c[k]) + pose.frame.half_width[k];
   pose.is_known = size < 0x1p400;  // NaN is not
+  pose.width = pose.frame.half_width;
   const auto load = [](const auto& from, std::size_t i) __attribute__((always_inline)) { return LoadLanes(&from[i]); };
   const Lanes cosine = AllLanes(pose.cosine), sine = AllLanes(pose.sine);
   for (std::size_t i = 0; i < points_.size(); i += kLaneCount) {
-    const Lanes x = load(outline_.x, i), y = load(outline_.y, i);
+    const Lanes x = load(outline_.place[0], i), y = load(outline_.place[1], i);
     StoreLanes(AllLanes(c[0]) + (cosine * x - sine * y), &pose.middle[0][i]);
     StoreLanes(AllLanes(c[1]) + (sine * x + cosine * y), &pose.middle[1][i]);
-    if (dim() == 3) StoreLanes(AllLanes(c[2]) + load(outline_.z, i), &pose.middle[2][i]);
+    if (dim() == 3) StoreLanes(AllLanes(c[2]) + load(outline_.place[2], i), &pose.middle[2][i]);
     StoreLanes(load(outline_.length, i) * AllLanes(turn) + load(outline_.turn, i), &pose.around[i]);
   }
 }
@@ -251,26 +254,46 @@ Hull Placement::BodyInline(const Pose& pose) const noexcept {
     const double slack = RoundingError(kPlaceMargin, std::abs(center[k]) + half_width[k] + size) + kLeastNormal;
     const double least = -largest(-lower[k]), most = largest(upper[k]);
     hull.center[k] = pose.is_known ? 0.5 * (least + most) : 0;
-    hull.half_width[k] = pose.is_known ? 0.5 * (most - least) + half_width[k] + slack : kInfinity;
+    hull.half_width[k] = pose.is_known ? 0.5 * (most - least) + pose.width[k] + slack : kInfinity;
   }
   return hull;
 }
 
 // Points in the order of the clock have their sides' normals turned round.
-void Placement::FindSides(const Part& part) noexcept {
-  if (part.count == 1 || dim() != 2) return;
-  const auto next = [&](int i) { return ToSize(i + 1 < part.first + part.count ? i + 1 : part.first); };
+std::array<double, 2> Placement::SideOf(const Part& part, int i, const Coordinates& of) noexcept {
+  const auto& [x, y, z] = of;
+  const auto next = [&](int j) { return ToSize(j + 1 < part.first + part.count ? j + 1 : part.first); };
   double area = 0;
-  for (int i = part.first; i < part.first + part.count; ++i) {
-    const Eigen::Vector3d &a = points_[ToSize(i)].place, &b = points_[next(i)].place;
-    area += a[0] * b[1] - a[1] * b[0];
+  for (int j = part.first; j < part.first + part.count; ++j)
+    area += x[ToSize(j)] * y[next(j)] - y[ToSize(j)] * x[next(j)];
+  const double along_x = x[next(i)] - x[ToSize(i)], along_y = y[next(i)] - y[ToSize(i)],
+               length = std::sqrt(along_x * along_x + along_y * along_y),
+               scale = length > 0x1p-300 && length < 0x1p300 ? std::copysign(1 / length, area) : 0;
+  return {scale * along_y, -scale * along_x};
+}
+
+void Placement::PoseOver(const Sample& sample, Pose& pose, InstructionSet instructions) const noexcept {
+  PoseOver(*sample.slice, sample.half_width, pose, instructions);
+  if (!expressions_) return;
+  EncloseHull(sample, pose.frame);
+  if (!has_frame_) pose.width = {};
+  double size = 0;
+  for (std::size_t i = 0; i < PaddedToLanes(points_.size()); ++i) {
+    const std::size_t point = std::min(i, points_.size() - 1);
+    if (points_[point].linear < 0) continue;
+    double square = 0;
+    for (std::size_t k = 0; k < ToSize(dim()); ++k) {
+      const AffineEnclosure& linear = sample.linear[ToSize(points_[point].linear) + k];
+      double reach = sample.points[point].spread[k] + sample.points[point].slack[k];
+      for (std::size_t l = 0; l < sample.half_width.size(); ++l)
+        reach += std::abs(linear.slope[l]) * sample.half_width[l];
+      pose.middle[k][i] = sample.points[point].offset[k];
+      square += reach * reach;
+      size += std::abs(pose.middle[k][i]) + reach;
+    }
+    pose.around[i] = std::sqrt(square);
   }
-  for (int i = part.first; i < part.first + part.count; ++i) {
-    const Eigen::Vector3d edge = points_[next(i)].place - points_[ToSize(i)].place;
-    const double length = edge.norm(),
-                 scale = length > 0x1p-300 && length < 0x1p300 ? std::copysign(1 / length, area) : 0;
-    points_[ToSize(i)].side = {scale * edge[1], -scale * edge[0]};
-  }
+  pose.is_known &= size < 0x1p400;  // NaN is not
 }
 
 // A place without a finite second order is the box of the ranges; where a coordinate has none, there may be no place at
@@ -468,7 +491,7 @@ double Placement::SupportInline(const Sample& sample, const Part& part, const Ei
 void Placement::FarthestInline(const Pose& pose, const Zonotope& slice, const Part& part,
                                const std::array<double, 2>& d, Farthest& farthest) const noexcept {
   const auto [dx, dy] = d;
-  const double box = std::abs(dx) * pose.frame.half_width[0] + std::abs(dy) * pose.frame.half_width[1];
+  const double box = std::abs(dx) * pose.width[0] + std::abs(dy) * pose.width[1];
   const std::size_t first = ToSize(part.first), end = ToSize(part.first + part.count);
   std::array<double, kMaxBodyPoints> most{};
   std::size_t i = first;

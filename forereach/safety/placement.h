@@ -60,13 +60,15 @@ class Placement final {
   Box(X). Cost O(nonzeros of P). @pre no point stands at expressions. */
   void EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept;
 
-  /** Where the body is over one slice, loosely: the place of point i, as Enclose gives it, lies in middle[.][i] + [-w,
-  w] + {|y| <= around[i]}, with w the frame's half-widths, up to rounding. */
+  using Coordinates = std::array<std::array<double, kMaxBodyPoints>, kMaxSafetyDim>;
+  /** Where the body is over one slice, loosely: the place of point i, as Enclose gives it, lies in middle[.][i] +
+  [-width, width] + {|y| <= around[i]}, up to rounding. */
   struct Pose {
-    Hull frame;
-    double cosine, sine, turn;  // the last: the heading's half-width
-    bool is_known;              ///< Otherwise the points may be anywhere.
-    std::array<std::array<double, kMaxBodyPoints>, kMaxSafetyDim> middle;
+    Hull frame;                               ///< As EncloseHull gives it.
+    std::array<double, kMaxSafetyDim> width;  // that of the frame; 0 if no point is in it
+    double cosine, sine, turn;                // the last: the heading's half-width
+    bool is_known;                            ///< Otherwise the points may be anywhere.
+    Coordinates middle;
     std::array<double, kMaxBodyPoints> around;
   };
   /** Cost O(nonzeros of P), O(1) for each point, a sine and a cosine. @pre no point stands at expressions. */
@@ -81,13 +83,15 @@ class Placement final {
   /** Raises `farthest.support` to an upper bound, up to rounding, on max {d . y} for the places of a part's points, as
   Enclose gives them, and sets its point to one of them that is about as far; or leaves both if the bound is larger: p =
   2, d of length 1. It is tighter than by the middles and what is around them. Cost O(m) for m generators and each point
-  that may be the farthest. @pre the pose is that of the slice, and known. */
+  that may be the farthest. @pre the pose is that of the slice, and known; no point stands at expressions. */
   void FindFarthest(const Pose& pose, const Zonotope& slice, const Part& part, const std::array<double, 2>& d,
                     Farthest& farthest, InstructionSet instructions = BestInstructionSet()) const noexcept;
   /** The outward normal, of length 1, of the side from point i to the next of its part, p = 2, at the pose; zero if it
   has no length. */
-  [[nodiscard]] std::array<double, 2> Side(const Pose& pose, int i) const noexcept {
-    const auto& [x, y] = points_[ToSize(i)].side;
+  [[nodiscard]] std::array<double, 2> Side(const Pose& pose, const Part& part, int i) const noexcept {
+    const Point& point = points_[ToSize(i)];
+    if (point.linear >= 0) return SideOf(part, i, pose.middle);
+    const auto& [x, y] = point.side;
     return {pose.cosine * x - pose.sine * y, pose.sine * x + pose.cosine * y};
   }
 
@@ -116,6 +120,8 @@ class Placement final {
   /** Sets `hull` to one that contains the places of all points and, if some are in the frame, Box(P X), all of it
   widened by [-e, e]. Cost O(n) for each point at expressions. */
   void EncloseHull(const Sample& sample, Hull& hull) const noexcept;
+  /** As the other PoseOver, wherever the points stand. Cost as EncloseHull's, besides. */
+  void PoseOver(const Sample& sample, Pose& pose, InstructionSet instructions = BestInstructionSet()) const noexcept;
 
   /** The sample of a slice, which has to stay as it is while the sample is in use. @param half_width as above. Cost
   O(nonzeros of P) and O(1) for each point, a sine and a cosine if the body turns, and O(operations) of expressions. */
@@ -151,12 +157,14 @@ class Placement final {
 
   // As a structure of arrays, of the points in the frame; the last one again up to a full vector.
   struct Outline {
-    std::array<double, kMaxBodyPoints> x, y, z, length, turn, radius, size;
+    Coordinates place;
+    std::array<double, kMaxBodyPoints> length, turn, radius, size;
   };
 
   void OverSlice(const Point& point, const Rotation& rotation, Sample::Point& over) const noexcept;
   void OverSlice(Sample& sample, std::size_t i) const noexcept;
-  void FindSides(const Part& part) noexcept;
+  // Side, of a part whose points have these coordinates.
+  static std::array<double, 2> SideOf(const Part& part, int i, const Coordinates& of) noexcept;
   FOREREACH_INLINE double SupportInline(const Sample& sample, const Part& part,
                                         const Eigen::Vector3d& d) const noexcept;
   FOREREACH_INLINE void PoseInline(const Zonotope& slice, std::span<const double> half_width,

@@ -408,7 +408,7 @@ TEST(Body, TheSupportOfAPartContainsItsPlaces) {
         of_places = std::max(
             of_places, places[static_cast<std::size_t>(i)].SupportUpper({d.data(), 2}) + d.norm() * placement.turn(i));
       EXPECT_NEAR(support, of_places, 1e-11 * scale) << round;
-      const auto& width = pose.frame.half_width;
+      const auto& width = pose.width;
       double of_pose = -kInfinity;
       for (std::size_t i = ToSize(part.first); i < ToSize(part.first + part.count); ++i)
         of_pose = std::max(of_pose, d[0] * pose.middle[0][i] + d[1] * pose.middle[1][i] + d.norm() * pose.around[i] +
@@ -463,7 +463,7 @@ TEST(Body, ItsSidesPointOutward) {
     Placement::Pose pose;
     placement.PoseOver(Zonotope::FromBox(Vec({5, 6, 0.7}), Vec({0, 0, 0})), std::array<double, 3>{}, pose);
     for (int i = 0; i < 4; ++i) {
-      const std::array<double, 2> side = placement.Side(pose, i);
+      const std::array<double, 2> side = placement.Side(pose, placement.parts()[0], i);
       EXPECT_NEAR(std::hypot(side[0], side[1]), 1, 1e-15);
       const auto along = [&](int j) {
         return side[0] * pose.middle[0][ToSize(j)] + side[1] * pose.middle[1][ToSize(j)];
