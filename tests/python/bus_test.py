@@ -23,6 +23,8 @@ CERTIFIER = f"{BUILD}/certifier/process/forereach-certifier" if BUILD else "fore
 TASK = "examples/python/rover.yaml"
 # Below the ports that the kernel hands out by itself, and of this process alone.
 URL = f"udpm://239.255.76.67:{10_000 + os.getpid() % 10_000}?ttl=0"
+# A robot ends by it, and would inherit that it is ignored, as what a script starts with & does.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def now():
