@@ -1,7 +1,8 @@
 // How long one certify call takes, beside the straightforward version, and each stage of it alone.
 //   certify_bench [--largest=N] [any flag of Google Benchmark]
-// Names are scenario/N: what scripts/bench reads from the JSON. --largest leaves out tasks of more observations; those
-// of 10^7 take a minute and 8 GB to set up, and run only where it asks for them.
+// It is run from the project's directory. Names are scenario/N: what scripts/bench reads from the JSON. --largest
+// leaves out tasks of more observations; those of 10^7 take a minute and 8 GB to set up, and run only where it asks for
+// them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -24,6 +25,7 @@
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/parallel.h"
 #include "forereach/safety/obstacle_index.h"
+#include "task/config.h"
 
 namespace forereach::bench {
 namespace {
@@ -263,6 +265,37 @@ void RegisterMaps() {
   }
 }
 
+// Tasks as people write them: ten steps of the middle of their inputs, if that is certified among nothing.
+void RegisterTasks() {
+  for (const char* name : {"demo", "truck", "arm", "drive/boat", "drive/cart_pole", "drive/differential_drive",
+                           "drive/kinematic_bicycle", "drive/planar_quadrotor", "drive/point_mass",
+                           "drive/reaching_arm", "drive/single_track", "drive/two_link_arm", "drive/unicycle"}) {
+    struct Made {
+      explicit Made(const std::string& path) {
+        const Config config = LoadConfig(path);
+        const Box &inputs = config.problem->domain.input, &set = config.initial_set;
+        task.problem = config.problem;
+        task.center = (set.lower() + set.upper()) / 2;
+        task.half_width = (set.upper() - set.lower()) / 2;
+        task.controls = ((inputs.lower() + inputs.upper()) / 2).replicate(1, 10);
+        certifier.emplace(task.problem);
+        cells = MapCells(*certifier, task, false, 2000);
+        index = ObstacleIndex(cells);
+      }
+      Task task;
+      std::optional<Certifier> certifier;
+      std::vector<Obstacle> cells;
+      ObstacleIndex index;
+    };
+    const auto made = std::make_shared<std::optional<Made>>();
+    for (const bool among_cells : {false, true})
+      Register(std::string("task/") + name + (among_cells ? "/map_2000" : "/none"), [=](State& state) {
+        const Made& all = *made ? **made : made->emplace(std::string("config/") + name + ".yaml");
+        RunCertify(state, *all.certifier, all.task, among_cells ? ObstacleView(all.cells, all.index) : ObstacleView());
+      });
+  }
+}
+
 // The bicycle as text beside the compiled one, its integrators, and a large model.
 using Integrator = ModelText::Integrator;
 struct NamedTask {
@@ -326,6 +359,7 @@ void RegisterAll(int largest) {
   RegisterNominalTube();
   RegisterWorlds();
   RegisterMaps();
+  RegisterTasks();
   RegisterTextModels();
   RegisterOffsets();
   RegisterBatch();

@@ -74,6 +74,9 @@ class Report:
     def cpu(self, name):
         return self.benchmarks[name].cpu if name in self.benchmarks else None
 
+    def tasks(self):
+        return [name[len("task/"):-len("/none")] for name in self.benchmarks if name.startswith("task/") and name.endswith("/none")]
+
     # What stands for each @name@ of the template.
 
     def command(self):
@@ -138,6 +141,10 @@ class Report:
                      for body in ("point", "rectangle", "rectangle_swept")], 1.5, "outlines with the edges between two samples")
             for place, cells in (("along a street, over none: point, rectangle, rectangle at all times", "street"),
                                  ("anywhere, the same", "map"))
+        ] + [
+            at_most("the same, of the tasks " + ", ".join(self.tasks()),
+                    [ratio(self.cpu(f"task/{name}/map_2000"), self.cpu(f"task/{name}/none")) for name in self.tasks()],
+                    1.5, "as above")
         ] + [
             at_most(label, self.beside_compiled(name), bound,
                     "fewer terms in the chain rule of its stages, 23 % of the instructions")

@@ -426,11 +426,23 @@ TEST(ObstacleIndex, FindsTheOneThatIsTouchedAmongThousands) {
   ExpectSame(found, certifier.Certify(plan, set, cells, tube));
 }
 
+// The part of the robot's frame at the same places by expressions of the state.
+BodyPart AtExpressions(const BodyPart& part, const NominalModel& model) {
+  const auto names = model.state_names();
+  BodyPart same{{}, part.radius};
+  for (const Eigen::Vector3d& q : part.points) {
+    const std::string a = std::to_string(q[0]), b = std::to_string(q[1]), turn = "(" + names[2] + ")";
+    same.places.push_back({{names[0] + " + " + a + "*cos" + turn + " - " + b + "*sin" + turn},
+                           {names[1] + " + " + a + "*sin" + turn + " + " + b + "*cos" + turn}});
+  }
+  return same;
+}
+
 // A long body that may turn: its sides leave out what the box around it meets.
 TEST(ObstacleIndex, ChangesNoDecisionBesideALongBodyThatTurns) {
   TracedRandom random(7);
   int certified = 0, touched = 0;
-  for (int drives = 0; drives < 40;) {
+  for (int drives = 0; drives < 60;) {
     Problem problem = *AnyWorld(random, true);
     const double length = random.Uniform(0.5, 4), width = random.Uniform(0, 1), ahead = random.Uniform(-1, 3);
     problem.projection = Eigen::MatrixXd::Identity(2, problem.model->num_states());
@@ -440,6 +452,9 @@ TEST(ObstacleIndex, ChangesNoDecisionBesideALongBodyThatTurns) {
     if (random.Coin()) problem.body.parts[0].points.push_back({ahead + length, -width, 0});
     if (random.Coin(0.3)) std::ranges::reverse(problem.body.parts[0].points);
     if (random.Coin(0.3)) problem.body.parts.push_back({{{-length, 0, 0}, {length, 0, 0}}, 0.3});
+    if (const double share = random.Coin() ? random.Uniform(0, 2) : 0; share > 0)
+      for (BodyPart& part : problem.body.parts)
+        if (random.Coin(std::min(share, 1.0))) part = AtExpressions(part, *problem.model);
     const Certifier certifier(std::make_shared<Problem>(problem));
     Query query = AnyDrive(random, problem);
     Tube tube;

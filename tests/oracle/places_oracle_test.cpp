@@ -42,6 +42,9 @@ TEST(PlacesOracle, ContainTheExactPlacesOfEveryState) {
     placement.Enclose(sample, places.data());
     Hull hull;
     placement.EncloseHull(sample, hull);
+    Placement::Pose pose;
+    placement.PoseOver(sample, pose);
+    const Hull body = placement.EncloseBody(pose);
     for (int point = 0; point < 6; ++point) {
       const auto weight = [&] { return random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1); };
       std::vector<Real> values(slice.center().begin(), slice.center().end());
@@ -54,11 +57,15 @@ TEST(PlacesOracle, ContainTheExactPlacesOfEveryState) {
       values.emplace_back(1.5);
       const Eigen::Vector3d d = random.Vector(3);
       for (std::size_t i = 0; i < kPlaces.size(); ++i) {
-        Real along(0.0);
+        Real along(0.0), square(0.0);
         for (std::size_t k = 0; k < 3; ++k) {
           const Real at = Evaluate<Real>(expressions[3 * i + k], values, [](double x) { return Real(x); });
           along += Real(d[static_cast<Eigen::Index>(k)]) * at;
           ASSERT_TRUE(abs(at - Real(hull.center[k])) <= Real(hull.half_width[k])) << kPlaces[i][k];
+          ASSERT_TRUE(abs(at - Real(body.center[k])) <= Real(body.half_width[k])) << kPlaces[i][k];
+          const Real apart = at - Real(pose.middle[k][i]), hair = Real(0x1p-45) * (abs(at) + Real(1.0));
+          square += apart * apart;
+          ASSERT_TRUE(!pose.is_known || sqrt(square) <= Real(pose.around[i]) + hair) << kPlaces[i][k];
         }
         ASSERT_TRUE(along <= Real(placement.SupportUpper(sample, placement.parts()[i], d))) << i;
         ASSERT_TRUE(along <= Real(places[i].SupportUpper({d.data(), 3}))) << i;
