@@ -209,14 +209,17 @@ Nodes::Nodes(const Ways& ways, int k) : ways_(ways), k_(k) {
   for (Axis& axis : axes_) axis.stride = std::exchange(nodes, nodes * axis.ticks.size());
   constexpr double kUnbounded = std::numeric_limits<double>::infinity();
   sides_.fill({std::vector<Real>(nodes, Real(kUnbounded)), std::vector<double>(nodes, kUnbounded)});
-  for (Axis& axis : axes_) axis.slopes.assign(nodes, kUnbounded);
+  for (Axis& axis : axes_)
+    for (std::size_t i = 1; i < axis.ticks.size(); ++i)
+      axis.widths.push_back(Real(axis.ticks[i]) - Real(axis.ticks[i - 1]));
+  for (Axis& axis : axes_) axis.slopes = axis.cells = std::vector<double>(nodes, kUnbounded);
   for (std::size_t cell = 0; cell < nodes; ++cell) {
     if (std::ranges::any_of(axes_, [&](const Axis& axis) { return TickOf(axis, cell) + 1 == axis.ticks.size(); }))
       continue;
     // An edge lies in every cell around it: the least slope holds.
     const std::vector<std::size_t> corners = CornersOf(cell);
     for (Axis& axis : axes_) {
-      const double slope = Slope(axis, cell);
+      const double slope = axis.cells[cell] = Slope(axis, cell);
       for (const std::size_t node : corners)
         if (TickOf(axis, node) == TickOf(axis, cell)) axis.slopes[node] = std::min(axis.slopes[node], slope);
     }
@@ -243,7 +246,7 @@ double Nodes::SlopeOn(std::size_t a, std::size_t node) const {
     cells = std::move(around);
   }
   double least = std::numeric_limits<double>::infinity();
-  for (const std::size_t cell : cells) least = std::min(least, Slope(axes_[a], cell));
+  for (const std::size_t cell : cells) least = std::min(least, axes_[a].cells[cell]);
   return least;
 }
 
@@ -299,13 +302,13 @@ void Nodes::Spread(Side& side) const {
         const std::size_t at = TickOf(axis, node), first = up ? at : at - 1;
         if (up ? at + 1 == axis.ticks.size() : at == 0) continue;
         const std::size_t next = up ? node + axis.stride : node - axis.stride;
-        const double begin = axis.ticks[first], end = axis.ticks[first + 1];
-        const double slope = axis.slopes[std::min(node, next)], roughly = side.roughly[node] + slope * (end - begin);
+        const double slope = axis.slopes[std::min(node, next)],
+                     roughly = side.roughly[node] + slope * (axis.ticks[first + 1] - axis.ticks[first]);
         // Also where numbers are too large or too small for doubles to tell.
         if (const double known = side.roughly[next]; std::abs(roughly) > 1e-250 && known < 1e250 &&
                                                      roughly - known > kRoughly * (std::abs(roughly) + std::abs(known)))
           continue;
-        Reach(side, next, side.values[node] + Real(slope) * (Real(end) - Real(begin)));
+        Reach(side, next, side.values[node] + Real(slope) * axis.widths[first]);
       }
   }
 }

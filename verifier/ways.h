@@ -83,8 +83,10 @@ class Nodes final {
     int variable;
     std::vector<double> ticks;
     double largest_slope;             // over the domain
+    std::vector<Real> widths = {};    // of the strips between ticks
     std::size_t stride = 0;           // from a node to the next
     std::vector<double> slopes = {};  // by node: along the edge to the next
+    std::vector<double> cells = {};   // by cell: within it
   };
   // Upper bounds on sign * r_k. Doubles near them tell what may be less; those that wait have not told their
   // neighbours.
