@@ -76,10 +76,8 @@ class Report:
 
     # How much longer the calls of tasks take among a map's cells, the most first.
     def among_cells(self):
-        return sorted(((ratio(self.cpu(name.replace("/none", "/map_2000")), self.cpu(name)), name[len("task/"):-len("/none")])
-                       for name in self.benchmarks
-                       if name.startswith("task/") and name.endswith("/none") and name.replace("/none", "/map_2000") in self.benchmarks),
-                      reverse=True)
+        names = [name.split("/", 1)[1].removesuffix("/none") for name in self.benchmarks if re.fullmatch("task/.*/none", name)]
+        return sorted(((ratio(self.cpu(f"task/{name}/map_2000"), self.cpu(f"task/{name}/none")), name) for name in names), reverse=True)
 
     # What stands for each @name@ of the template.
 
@@ -150,7 +148,7 @@ class Report:
                                  ("anywhere, the same", "map"))
         ] + [
             at_least(f"so many of {len(tasks)} tasks of `config/` at most 1.5 times (most: {', '.join(f'{name} {number(most)}' for most, name in tasks[:3])})",
-                     sum(each <= 1.5 for each, _ in tasks), len(tasks), "units that overlap, as where a car hardly moves")
+                     sum(each <= 1.5 for each, _ in tasks) if tasks else None, len(tasks), "units that overlap")
         ] + [
             at_most(label, self.beside_compiled(name), bound,
                     "fewer terms in the chain rule of its stages")

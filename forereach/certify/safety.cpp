@@ -276,11 +276,10 @@ class SafetyTest::Unit {
     return obstacle.motion() ? meeting_ = Meet(*obstacle.motion(), schedule_, first_, last_) : kStands;
   }
 
-  [[nodiscard]] const Placement::Sample& SampleAt(int t) noexcept {
-    const std::size_t half = ToSize(t % 2);
-    if (observed_[half] != t) placement().Observe(tube_.slice(t), tube_.half_width(t), samples_[half]);
-    observed_[half] = t;
-    return samples_[half];
+  // Of the body at sample t.
+  void EnclosePose(int t, Placement::Pose& pose) noexcept {
+    if (placement().has_expressions()) return placement().PoseOver(SampleAt(t), pose, test_.instructions_);
+    placement().PoseOver(tube_.slice(t), tube_.half_width(t), pose, test_.instructions_);
   }
 
  private:
@@ -304,6 +303,13 @@ class SafetyTest::Unit {
   void EncloseHull(int t, Hull& hull) noexcept {
     if (placement().has_expressions()) return placement().EncloseHull(SampleAt(t), hull);
     placement().EncloseHull(tube_.slice(t), tube_.half_width(t), hull);
+  }
+
+  [[nodiscard]] const Placement::Sample& SampleAt(int t) noexcept {
+    const std::size_t half = ToSize(t % 2);
+    if (observed_[half] != t) placement().Observe(tube_.slice(t), tube_.half_width(t), samples_[half]);
+    observed_[half] = t;
+    return samples_[half];
   }
 
   [[nodiscard]] const Zonotope* PlacesAt(int t) noexcept {
@@ -496,6 +502,10 @@ class SafetyTest::Judgement {
   [[nodiscard]] double* BoundsOf(int t) noexcept { return bounds_.data() + ToSize(t - first_) * cores_.stride(); }
 
   void EncloseHulls() noexcept {
+    if (has_boxes()) {
+      for (int t = first_; t < units_; ++t) hulls_[ToSize(t - first_)] = HullOfPoses(t);
+      return;
+    }
     for (int t = first_; t < units_; ++t) {
       unit_.Enter(t);
       unit_.EncloseHulls();
@@ -503,6 +513,11 @@ class SafetyTest::Judgement {
       poses_[ToSize(t - first_)].frame = unit_.first_hull();
     }
     poses_[ToSize(units_ - 1 + span() - first_)].frame = unit_.last_hull();
+  }
+  // As Unit::hull. @pre EncloseBodies.
+  [[nodiscard]] Hull HullOfPoses(int t) const noexcept {
+    const std::size_t i = ToSize(t - first_);
+    return span() == 0 ? poses_[i].frame : Join(poses_[i].frame, poses_[i + 1].frame, test_.placement_.dim());
   }
 
   // What has no end in each unit; the others where the index finds them near.
@@ -607,10 +622,7 @@ class SafetyTest::Judgement {
     Hull after{};
     for (int t = units_ - 1 + span(); t >= first_; --t) {
       const std::size_t i = ToSize(t - first_);
-      if (placement.has_expressions())
-        placement.PoseOver(unit_.SampleAt(t), poses_[i], test_.instructions_);
-      else
-        placement.PoseOver(tube_.slice(t), tube_.half_width(t), poses_[i], test_.instructions_);
+      unit_.EnclosePose(t, poses_[i]);
       const Hull body = placement.EncloseBody(poses_[i], test_.instructions_);
       if (t < units_) bodies_[i] = span() == 0 ? body : AroundBoth(body, after);
       after = body;
@@ -830,12 +842,8 @@ class SafetyTest::Judgement {
 
   // Of what stands, with an index.
   [[nodiscard]] Separation ByHulls(int t, int o) const noexcept {
-    const std::size_t i = ToSize(t - first_);
-    const auto hull = [&] {
-      const Hull &first = poses_[i].frame, &last = poses_[i + ToSize(span())].frame;
-      return span() == 0 ? first : Join(first, last, test_.placement_.dim());
-    };
-    return SeparateHulls(has_boxes() ? hull() : hulls_[i], obstacle(o), test_.placement_.reach());
+    return SeparateHulls(has_boxes() ? HullOfPoses(t) : hulls_[ToSize(t - first_)], obstacle(o),
+                         test_.placement_.reach());
   }
 
   // @pre unit t is entered, with its hulls.

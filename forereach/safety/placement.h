@@ -120,7 +120,7 @@ class Placement final {
   /** Sets `hull` to one that contains the places of all points and, if some are in the frame, Box(P X), all of it
   widened by [-e, e]. Cost O(n) for each point at expressions. */
   void EncloseHull(const Sample& sample, Hull& hull) const noexcept;
-  /** As the other PoseOver, wherever the points stand. Cost as EncloseHull's, besides. */
+  /** As the other PoseOver, wherever the points stand. Besides, it costs what EncloseHull does. */
   void PoseOver(const Sample& sample, Pose& pose, InstructionSet instructions = BestInstructionSet()) const noexcept;
 
   /** The sample of a slice, which has to stay as it is while the sample is in use. @param half_width as above. Cost
